@@ -19,13 +19,13 @@ from fourbar_validation.advise import advise, matters
 from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.rows import FAILS
 from fourbar_validation.engines.guests import Guest, adjust_engines
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
 from fourbar_validation.engines.mujoco.trial import compute_expected_error
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
+from tests.support.here import THROUGH_TIME
 from tests.validation.cost.test_cost import turning
 
 
@@ -52,10 +52,8 @@ def call(tmp_path):
 def test_figures_of_the_crank_rocker(omega, required, most):
     advice = advise.advise(turning(omega, 72), required)
     assert advice.reached and advice.best.steps_per_revolution <= most, advice.reason
-    assert (
-        advice.best.errors.worst <= required
-        and advice.best.settings.integrator == "RK4"
-    )
+    assert advice.best.errors.worst <= required
+    assert advice.best.settings.integrator == "RK4"
     serves = [
         attempt
         for attempt in advice.attempts
@@ -115,8 +113,7 @@ def test_no_curve_is_drawn_through_a_pole():
 def test_figures_of_rockers_and_the_thesis(name, most):
     advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
     assert advice.reached, advice.reason
-    assert advice.best.steps <= most
-    assert advice.best.steps_per_revolution <= most
+    assert max(advice.best.steps, advice.best.steps_per_revolution) <= most
 
 
 @pytest.mark.slow
@@ -178,45 +175,38 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one():
 
 @pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
 def test_an_error_is_between_0_and_1(required):
-    with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        advise.advise(turning(), required)
-    with pytest.raises(fourbar.errors.InputError, match="above 0 and below 1"):
-        adjust_engines(ENGINES, required)
+    for ask, asked in ((advise.advise, turning()), (adjust_engines, ENGINES)):
+        with pytest.raises(fourbar.InputError, match="above 0 and below 1"):
+            ask(asked, required)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("required", [1e-3, 1e-7])
 def test_a_run_is_no_more_precise_than_required(required):
     scene = turning(positions=90)
-    engines = [engine for engine in ENGINES if engine.through_time]
-    record = judge("s", scene, adjust_engines(engines, required))
-    assert not [row for row in record.rows if row.verdict == FAILS]
+    record = judge("s", scene, adjust_engines(THROUGH_TIME, required))
+    assert not [row for row in record.rows if row.failed]
     (answer,) = record.answers
-    answers = [
-        row
+    errors = [
+        row.error
         for row in record.rows
         if row.engine == "mujoco-simulated" and row.quantity != "as shipped"
     ]
-    worst = max(row.error for row in answers)
-    assert (
-        answer.evidence["wanted_error"] == required
-        and answer.evidence["expected_error"] <= required
-    )
+    evidence = answer.evidence
+    assert evidence["wanted_error"] == required >= evidence["expected_error"]
     # the engine's own prediction is what the formulas find, though it never saw them
-    assert worst == pytest.approx(answer.evidence["expected_error"], rel=0.5)
-    assert answer.evidence["steps"] < 628
+    assert max(errors) == pytest.approx(evidence["expected_error"], rel=0.5)
+    assert evidence["steps"] < 628
 
 
 def test_a_guest_is_asked_for_the_error_and_not_answered_for_by_the_harness():
-    (simulated,) = (engine for engine in ENGINES if engine.through_time)
+    (simulated,) = THROUGH_TIME
     guest = Guest("mujoco 3.3.7", partial(dict), simulated.tolerance, through_time=True)
     ours, theirs, exact = adjust_engines(
         (simulated, guest, replace(guest, through_time=False)), 1e-3
     )
-    assert (
-        ours.start != simulated.start
-        and theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
-    )
+    assert ours.start != simulated.start
+    assert theirs.start() == {"setting": {"error": 1e-3}} == exact.start()
     assert theirs.tolerance == ours.tolerance != exact.tolerance == guest.tolerance
 
 
@@ -224,7 +214,7 @@ def test_exact_engines_stay_exact():
     (changed,) = {*adjust_engines(ENGINES, 1e-3)} - {*ENGINES}
     assert changed.name == "mujoco-simulated"
     assert changed.tolerance.factor == 1e-3
-    assert changed.answers == next(w.answers for w in ENGINES if w.through_time)
+    assert changed.answers == THROUGH_TIME[0].answers
 
 
 @pytest.mark.slow
@@ -249,11 +239,8 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
         first, *others = influences = matters.measure_influences(
             scene, setup, advise.make_settings(40.0, 12.0)
         )
-        assert (
-            first.setting == setting
-            and first.times > 10.0
-            and why in matters.write_sentence(influences)
-        )
+        assert first.setting == setting and first.times > 10.0
+        assert why in matters.write_sentence(influences)
         assert all(first.times >= influence.times for influence in others)
     quiet = [replace(influence, times=1.5) for influence in influences]
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")

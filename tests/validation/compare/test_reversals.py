@@ -9,8 +9,8 @@ import pytest
 import fourbar
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
+from tests.support.here import EXACT
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5
@@ -32,8 +32,7 @@ def test_both_sides_are_judged_and_the_reversal_itself_is_not(start):
 
     The engines' rounding decides their sense there.
     """
-    exact = [engine for engine in ENGINES if not engine.through_time]
-    record = judge("scene", scene("B", start=start), exact)
+    record = judge("scene", scene("B", start=start), EXACT)
     assert [row for row in record.rows if not row.passed] == []
     noted = [row.reason for row in record.rows if "reverses not judged" in row.reason]
     assert bool(noted) == (start == 0.0)

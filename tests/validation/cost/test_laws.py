@@ -31,12 +31,6 @@ def test_a_law_holds_within_a_third_of_an_order(order, holds):
 
 
 def test_a_law_with_a_jump_does_not_hold_whatever_its_slope():
-    ladder = [point(n, 1e-2 * (STEPS[0] / n) ** 4) for n in STEPS]
-    ladder[3] = point(STEPS[3], 2e-2)
-    found = fit_laws({"RK4, tc held": ladder})
-    assert all(
-        "at 160 steps" in str(law) or "at 320 steps" in str(law) for law in found
-    )
     law = ErrorLaw("RK4", "F12", 4.0, 0.01, 4.0, 6, jumps=("at 320",))
     assert law.decided and not law.holds
     assert replace(law, jumps=()).holds

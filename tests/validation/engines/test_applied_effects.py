@@ -26,8 +26,8 @@ from fourbar.effects import (
 )
 from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.applied_effects import TERM_OF
-from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
+from tests.support.here import EXACT, THROUGH_TIME
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
@@ -52,23 +52,10 @@ def make_spring(one, other, numbers, acts):
 
 ACTING = {
     "gravity": Gravity(9.81, 0.3),
-    "viscous": Viscous.at(
-        O2=0.02,
-        A=0.03,
-        B=0.04,
-        O4=0.05,
-    ),
-    "friction": Friction.at(
-        O2=0.02,
-        A=0.03,
-        B=0.04,
-        O4=0.05,
-    ),
+    "viscous": Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
+    "friction": Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
     "pin_friction": PinFriction.at(
-        O2=(0.2, 0.01),
-        A=(0.3, 0.01),
-        B=(0.1, 0.02),
-        O4=(0.2, 0.01),
+        O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)
     ),
     "torsion": Torsion.at(O4=(2.0, 1.9, 0.1), B=(1.0, 0.8, -0.2)),
     "springs": Springs(
@@ -94,8 +81,6 @@ ACTING = {
         table=TABLE,
     ),
 }
-EXACT = [engine for engine in ENGINES if not engine.through_time]
-SIMULATED = [engine for engine in ENGINES if engine.through_time]
 ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}
 """What acts by `TERM_OF`, the table of the engines."""
 NO_COUNTERPART = {
@@ -154,7 +139,7 @@ def test_exact_engines_agree(names):
 def test_the_simulation_agrees_or_says_what_it_has_no_counterpart_for(names):
     missing = NO_COUNTERPART["mujoco-simulated"] & set(names)
     refusing = {"mujoco-simulated"} if missing else set()
-    assert outcome(scene(*names), SIMULATED) == ([], refusing)
+    assert outcome(scene(*names), THROUGH_TIME) == ([], refusing)
 
 
 def fail_with(name, engines):

@@ -8,17 +8,7 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar.effects import (
-    Friction,
-    Gravity,
-    Load,
-    PinFriction,
-    Place,
-    Spring,
-    Springs,
-    Torsion,
-    Viscous,
-)
+from fourbar.effects import Gravity, Load, Place, Spring, Springs, Torsion
 from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
@@ -26,19 +16,15 @@ from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody, continue_couples
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
+from tests.validation.engines.test_applied_effects import ACTING
 from tests.whole.test_imports import imported
 
 EPS = 2.0**-52
 DIGITS = 50.0 * EPS
 """Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles.
 """
-RECTANGLE = fourbar.FourBar(
-    0.3,
-    fourbar.Bar(0.1),
-    fourbar.Bar(0.3),
-    fourbar.Bar(0.1),
-)
+RECTANGLE = bare(0.3, 0.1, 0.3, 0.1)
 
 
 def answered(scene):
@@ -118,7 +104,7 @@ def test_a_lever_of_an_upright_rectangle(drive, forces):
 SPRING = Springs(
     (Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05, 3.0),)
 )
-TORSION = fourbar.effects.Torsion.at(O4=(2.0, 1.9, 0.1))
+TORSION = Torsion.at(O4=(2.0, 1.9, 0.1))
 
 
 def test_over_a_turn_what_stores_energy_gives_it_back():
@@ -145,41 +131,23 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
     assert most > 1.0
 
 
-PIN_NUMBERS = {"viscous": "coefficients", "friction": "torques"}
-PIN_NUMBERS["pin_friction"] = "pins"
-
-
-@pytest.mark.parametrize(
-    "effect",
-    [
-        Viscous.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
-        Friction.at(O2=0.02, A=0.03, B=0.04, O4=0.05),
-        PinFriction.at(O2=(0.2, 0.01), A=(0.3, 0.01), B=(0.1, 0.02), O4=(0.2, 0.01)),
-    ],
-    ids=lambda effect: effect.key,
-)
-def test_what_brakes_takes_the_power_that_the_drive_gives_more(effect):
+@pytest.mark.parametrize("key", ["viscous", "friction", "pin_friction"])
+def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
     """Couple times slip at each pin, at every position.
 
     Of pin friction with the forces that it changes itself.
     """
-    braked, free = (
-        answered(crank_rocker(effects=effects)) for effects in ((effect,), ())
-    )
-    omega = {
-        1: 0.0,
-        2: 10.0,
-        3: braked["omega_3"],
-        4: braked["omega_4"],
-    }
+    effect = ACTING[key]
+    braked = answered(crank_rocker(effects=(effect,)))
+    omega = [0.0, 10.0, braked["omega_3"], braked["omega_4"]]
     loss = 0.0
-    for pin, *numbers in getattr(effect, PIN_NUMBERS[effect.key]):
+    for pin, *numbers in effect.rows:
         i, j = PINS[pin]
-        slip = np.abs(omega[j] - omega[i])
+        slip = np.abs(omega[j - 1] - omega[i - 1])
         load = np.hypot(*braked[PIN_FORCE[pin]].T)
-        size = {"viscous": slip, "friction": 1.0, "pin_friction": load}[effect.key]
+        size = {"viscous": slip, "friction": 1.0, "pin_friction": load}[key]
         loss = loss + math.prod(numbers) * slip * size
-    more = 10.0 * (braked["torque"] - free["torque"])
+    more = 10.0 * (braked["torque"] - answered(crank_rocker(effects=()))["torque"])
     assert (loss > 0.0).all()
     allowed = 1e-12 * 10.0 * np.abs(braked["torque"]).max()
     assert more == approx(loss, abs=allowed, rel=0)

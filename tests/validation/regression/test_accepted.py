@@ -16,18 +16,19 @@ from fourbar_validation.regression import render
 from fourbar_validation.regression.record import ACCEPTED, describe_run, find_baseline
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import read_default_suite
+from tests.support.here import EXACT
 from tests.support.runs import compare_rows, read_run
 
 SUITE = read_default_suite()
-EXACT = [engine for engine in ENGINES if not engine.through_time]
-"""A simulation through time takes longer than all of them; `validation run --against
-accepted` asks it too.
-"""
 
 
 @pytest.mark.slow
 def test_nothing_got_worse_since_the_accepted_state():
-    """Of prescribed motions; a released one is simulated."""
+    """Of prescribed motions; a released one is simulated.
+
+    A simulation through time takes longer than all exact engines: `validation run
+    --against accepted` asks it too.
+    """
     record, accepted = read_run(find_baseline(ACCEPTED))
     scenes = {SUITE.name(index): SUITE.scene(index) for index in range(len(SUITE))}
     assert {row.scene for row in accepted} == set(scenes)

@@ -18,16 +18,16 @@ from fourbar.scene.motion import Free, Law, Motion, Rise
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.compare.rows import DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.registry import ENGINES, Engine, hold_fully
+from fourbar_validation.engines.registry import Engine, hold_fully
 from fourbar_validation.run import released
 from fourbar_validation.run.judge import judge, make_question
 from fourbar_validation.run.law import check_law
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import draw_random_scene
+from tests.support.here import EXACT
 from tests.support.scenes import crank_rocker
 from tests.support.textbook import Textbook
 
-EXACT = [engine for engine in ENGINES if not engine.through_time]
 BY_ITSELF = [engine for engine in EXACT if not engine.library]
 POSITIONS = np.array([0.14, 1.75, 4.03, 4.73])
 

@@ -15,9 +15,10 @@ from fourbar.scene.motion import Law, Rise
 from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
 from fourbar_validation.run.judge import judge
+from tests.support.here import THROUGH_TIME
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
-from tests.validation.engines.test_applied_effects import ACTING, SIMULATED
+from tests.validation.engines.test_applied_effects import ACTING
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by
@@ -60,7 +61,7 @@ WHOLE_TURN = ACTING["load over theta_2"]
 
 
 def simulated(posed):
-    record = judge("scene", posed, SIMULATED)
+    record = judge("scene", posed, THROUGH_TIME)
     assert not [line for line in record.left_out if line.startswith("mujoco")]
     return [row for row in record.rows if row.engine == "mujoco-simulated"]
 

@@ -26,10 +26,9 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
-from tests.support.here import judge_by
+from tests.support.here import THROUGH_TIME, judge_by
 from tests.support.scenes import crank_rocker, thesis
 from tests.support.shares import slow_but
-from tests.validation.engines.test_applied_effects import SIMULATED as SIMULATION
 from tests.validation.engines.test_engines import commanded
 
 TURN = Sweep(0.1, 0.1 + 2 * math.pi, 90)
@@ -191,7 +190,7 @@ def hood(links, output=None):
 
 
 def judged(scene):
-    return judge("scene", scene, SIMULATION).rows
+    return judge("scene", scene, THROUGH_TIME).rows
 
 
 def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch):
@@ -211,7 +210,7 @@ def test_the_mass_that_a_massless_bar_is_advised_to_have_leads_to_a_pass(links, 
     assert refused.verdict == REFUSES
     mass = float(advised[1])
     heavier = hood(links or mass, None if output is None else mass)
-    rows = judge_by(*SIMULATION, heavier).values()
+    rows = judge_by(*THROUGH_TIME, heavier).values()
     assert {row.verdict for row in rows} == {AGREES}
 
 
@@ -264,7 +263,7 @@ def test_its_own_actuator_between_two_sites_gives_the_force_of_a_cylinder(
 def test_the_input_is_led_so_that_what_is_commanded_moves_as_told(
     what, branch, monkeypatch
 ):
-    (simulated,) = SIMULATION
+    (simulated,) = THROUGH_TIME
     scene = commanded(what, branch)
     question = Question("", scene, fourbar.command(scene))
     answer = question.answer(simulated)
