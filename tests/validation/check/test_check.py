@@ -91,27 +91,11 @@ def list_differing(scene, table):
 
 
 @pytest.fixture
-def read(tmp_path):
-    """Reads the text of a table."""
-
-    def read_text(text, **more):
-        path = tmp_path / "theirs.csv"
-        path.write_text(text)
-        return read_table(path, **more)
-
-    return read_text
-
-
-@pytest.fixture
 def judged(read):
     """Judges numbers that are written as a table."""
 
     def judge(scene, *numbers, tolerance=None):
-        return Judgement(
-            scene,
-            read(write(*numbers)),
-            tolerance,
-        )
+        return Judgement(scene, read(write(*numbers)), tolerance)
 
     return judge
 
@@ -294,11 +278,7 @@ def centred(change):
 
     def change_bar(bar):
         r, phi = bar.mass_centre
-        x, y = change(
-            bar.length,
-            r * math.cos(phi),
-            r * math.sin(phi),
-        )
+        x, y = change(bar.length, r * math.cos(phi), r * math.sin(phi))
         return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
 
     return change_bar
@@ -307,11 +287,7 @@ def centred(change):
 def weigh(bar, mass=1.0, inertia=1.0):
     """Multiply mass and moment of inertia about G."""
     inertia *= bar.moment_of_inertia
-    return replace(
-        bar,
-        mass=mass * bar.mass,
-        inertia=inertia,
-    )
+    return replace(bar, mass=mass * bar.mass, inertia=inertia)
 
 
 def scaled(**factors):
@@ -358,11 +334,7 @@ def inertial(by_mass, by_inertia):
 
     def planted(scene):
         numbers = right(scene)
-        still = right(
-            scene,
-            speed=0.0,
-            acceleration=0.0,
-        )
+        still = right(scene, speed=0.0, acceleration=0.0)
         points = bars(scaled(inertia=0.0))(scene)
         for name in FORCES:
             of_masses = by_mass * (points[name] - still[name])
@@ -422,17 +394,8 @@ OF_A_BAR = {
     ".mass left out": scaled(mass=0.0),
 }
 WHOSE = (("bars.coupler", ("coupler",)), ("bars.*", ()))
-LENGTHS = {
-    "ground": 1.01,
-    "input": 0.98,
-    "coupler": 1.001,
-    "output": 0.95,
-}
-FACTORS = {
-    "left out": 0.0,
-    "doubled": 2.0,
-    "reversed": -1.0,
-}
+LENGTHS = {"ground": 1.01, "input": 0.98, "coupler": 1.001, "output": 0.95}
+FACTORS = {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}
 IN_THESIS = {
     "numbers in N cm where N m was announced": units("torque", factor=1e2),
     "kgf": units(*PINS, factor=1 / 9.80665),
@@ -654,11 +617,7 @@ def test_places_by_points_and_arms_have_hypotheses(name):
 def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     digits, judged, read
 ):
-    numbers = units(
-        "torque",
-        "F12",
-        factor=1.0 / 9.81,
-    )(OURS)
+    numbers = units("torque", "F12", factor=1.0 / 9.81)(OURS)
     (explanation,) = judged(OURS, numbers, ("torque", "F12"), digits).explanations
     assert explanation.quantities == ("torque", "F12")
     angles = {"theta_2": numbers["theta_2"], "theta_4 [deg]": numbers["theta_4"]}
@@ -682,11 +641,7 @@ def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, r
 @pytest.mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
-    slip = numbers["torque"] * np.where(
-        np.arange(12) == 5,
-        -1.0,
-        1.0,
-    )
+    slip = numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)
     assert not judged(OURS, numbers | {"torque": slip}, ("torque",)).explanations
     rounded = [float(f"{x:.5f}") for x in np.radians(numbers["theta_2"])]
     numbers["theta_2"] = np.array(rounded)
@@ -766,21 +721,11 @@ def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check)
     assert result == code and words in out
 
 
-@pytest.mark.parametrize("letter", "xy")
-def test_one_component_is_judged_by_itself(letter, read):
-    name = f"F12_{letter}"
+@pytest.mark.parametrize("axis, name", [(0, "F12_x"), (1, "F12_y")])
+def test_the_sign_of_one_component_is_named_by_itself(axis, name, read):
     numbers = right(OURS)
-    column = numbers["F12"][:, "xy".index(letter)]
-
-    def judge(values):
-        columns = {"theta_2": numbers["theta_2"], name: values}
-        return Judgement(OURS, read(tabulate(columns)))
-
-    same = judge(column)
-    assert not same.differing and len(same.findings) == len(column)
-    off = judge(column + 1e-6 * np.abs(column).max())
-    assert {finding.quantity for finding in off.differing} == {name}
-    first = judge(-column).explanations[0]
+    columns = {"theta_2": numbers["theta_2"], name: -numbers["F12"][:, axis]}
+    first = Judgement(OURS, read(tabulate(columns))).explanations[0]
     assert "sign reversed" in first.text
     assert first.complete and first.quantities == (name,)
 
@@ -834,14 +779,6 @@ def test_nonsense_and_a_single_number_are_explained_by_nothing(judged, read):
     numbers = right(OURS)
     wild = numbers | {name: noise(3, numbers[name]) for name in FORCES}
     assert judged(OURS, wild, FORCES).explanations == []
-    one = {name: values[:1] for name, values in numbers.items()}
-    one["torque"] = 1.01 * one["torque"]
-    judgement = judged(
-        OURS,
-        one,
-        ("torque", "omega_4"),
-    )
-    assert len(judgement.differing) == 1 and not judgement.explanations
 
 
 @pytest.mark.parametrize("row", ["1e308,1e308", "1,1e-99999999", "\n0.8,1"])
@@ -937,15 +874,14 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     assert "429 of 429 numbers agree" in printed
 
 
-FAR_OFF = 1e-6
-"""Part of its largest number by which a column is off: beyond every allowed error."""
-
-
 @pytest.mark.parametrize(
     "name", slow_but({"drawn"}, ["drawn", "springs", "push_output"])
 )
 def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
-    """Each is judged at its own scale: A_x was once judged in newtons."""
+    """Each is judged at its own scale: A_x was once judged in newtons.
+
+    A millionth of the largest number of a column is beyond every allowed error.
+    """
     file = MODELS / "capabilities" / f"{name}.toml"
     path = tmp_path / "theirs.csv"
     assert fourbar_status(["analyze", str(file), "--csv", "-o", str(path)]) == HOLDS
@@ -961,7 +897,7 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     assert len(made) > len(MADE_OF)
     for key in table.columns.keys() - {*NOT_JUDGED, table.found_by}:
         column = table.columns[key]
-        far = FAR_OFF * np.nanmax(np.abs(column.values))
+        far = 1e-6 * np.nanmax(np.abs(column.values))
         exact = np.zeros(len(column.values))
         off = column._replace(values=column.values + far, rounding=exact)
         theirs = replace(table, columns={**table.columns, key: off})
@@ -996,16 +932,12 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     off = numbers | {"torque": numbers["torque"] * (1.0 + 1e-4)}
     text = write(off)
     document, suites = tmp_path / "out.json", tmp_path / "out.xml"
-    rows, count = len(numbers["theta_2"]), len(ALL) * len(numbers["theta_2"])
+    rows = len(numbers["theta_2"])
+    count = len(ALL) * rows
 
     def judge(*options):
         forms = (f"--json={document}", f"--junit={suites}")
-        code, printed, _ = check(
-            THESIS,
-            text,
-            *forms,
-            *options,
-        )
+        code, printed, _ = check(THESIS, text, *forms, *options)
         cases = ET.parse(suites).getroot().iter("testcase")
         failing = [one.get("name") for one in cases if one.find("failure") is not None]
         return code, printed, json.loads(document.read_text()), failing
@@ -1051,35 +983,32 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(re
     assert judgement.status == HOLDS and judgement.compared > 100
 
 
+STANDING = OURS.motion.replace(speed=None, acceleration=0.0)
+WITHOUT_SPEED = replace(OURS, motion=STANDING)
+
+
 @pytest.mark.slow
 def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(read):
     rates = {
         "omega_2": np.linspace(2.0, 9.0, 12),
         "alpha_2": np.linspace(-30.0, 40.0, 12),
     }
-    log = (
-        right(
-            OURS,
-            speed=rates["omega_2"],
-            acceleration=rates["alpha_2"],
-        )
-        | rates
-    )
-    still = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
+    speed, acceleration = rates.values()
+    log = right(OURS, speed=speed, acceleration=acceleration) | rates
 
     def judge(scene, *names):
         text = write(log, (*rates, *names)).replace("nan", "")
         return Judgement(scene, read(text))
 
     assert judge(OURS, *ALL).status == FAILED  # at the scene's one speed
-    judgement = judge(still, *ALL)
+    judgement = judge(WITHOUT_SPEED, *ALL)
     assert judgement.status == HOLDS
     assert {finding.quantity for finding in judgement.findings} == {*ALL}
     log["torque"][5] *= 1.0 + 1e-9
-    assert [finding.line for finding in judge(still, *ALL).differing] == [7]
-    assert judge(still).status == FAILED  # nothing compared
+    assert [finding.line for finding in judge(WITHOUT_SPEED, *ALL).differing] == [7]
+    assert judge(WITHOUT_SPEED).status == FAILED  # nothing compared
     log["omega_2"][3] = np.nan
-    assert judge(still, "F12").not_assembled == [5]
+    assert judge(WITHOUT_SPEED, "F12").not_assembled == [5]
 
 
 @pytest.mark.parametrize(
@@ -1100,15 +1029,10 @@ def test_the_speed_and_acceleration_of_a_row_are_rounded_too(
     log = right(OURS, speed=omega, acceleration=factor * alpha)
     rates = {"omega_2": omega.round(decimals), "alpha_2": alpha.round(decimals)}
     columns = {"theta_2": log["theta_2"], **rates, "torque": log["torque"]}
-    still = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
-    judgement = Judgement(still, read(tabulate(columns)))
-    if not said:
-        assert judgement.status == HOLDS
-        return
-    (found, *_) = [
-        *(one.text for one in judgement.explanations),
-        judgement.describe_unexplained(),
-    ]
+    judgement = Judgement(WITHOUT_SPEED, read(tabulate(columns)))
+    texts = [one.text for one in judgement.explanations]
+    found = [*texts, judgement.describe_unexplained()][0]
+    assert (judgement.status == HOLDS) == (not said)
     assert found.startswith(said)
 
 
@@ -1116,12 +1040,7 @@ def test_the_speed_and_acceleration_of_a_row_are_rounded_too(
 def torques(read):
     """Reads theta_2 of a crank-rocker in whole degrees and its torque in a form."""
     degrees = np.arange(0.0, 360.0, 30.0)
-    at = command(OURS).part(slice(len(degrees)))._replace(angle=np.radians(degrees))
-    torque = solve(
-        OURS,
-        "force",
-        at=at,
-    ).torque
+    torque = solve(OURS, at=command_at(OURS, np.radians(degrees))).torque
     rows = np.transpose([degrees, torque]).tolist()
 
     def read_form(head, row="{theta:.0f},{torque:.9e}"):
@@ -1221,39 +1140,14 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     input_mass, output_mass = (7850.0 * 0.05 * 0.025 * x for x in (1.0, 2.33))
     linkage = fourbar.FourBar(
         2.22,
-        Bar(
-            1.0,
-            input_mass,
-            0.82,
-        ),
-        Bar(
-            2.06,
-            219.95674411,
-            10.35,
-            (1.6476, math.radians(-18.7352)),
-        ),
-        Bar(
-            2.33,
-            output_mass,
-            50.13,
-        ),
+        Bar(1.0, input_mass, 0.82),
+        Bar(2.06, 219.95674411, 10.35, (1.6476, math.radians(-18.7352))),
+        Bar(2.33, output_mass, 50.13),
     )
-    load = fourbar.Load(
-        3,
-        (100.0, math.pi / 2.0),
-        from_pin=(3.06, math.radians(-31.0)),
-    )
-    motion = fourbar.Motion(
-        math.radians(60.0),
-        10.0,
-        5.0,
-    )
+    load = Load(3, (100.0, math.pi / 2.0), from_pin=(3.06, math.radians(-31.0)))
+    motion = Motion(math.radians(60.0), 10.0, 5.0)
     code, printed, _ = check(
-        Scene(
-            linkage,
-            motion,
-            loads=(load,),
-        ),
+        Scene(linkage, motion, loads=(load,)),
         "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]\n"
         "60,14271.89,23647.43,24055.14,7798.85,7515.91\n",
     )
@@ -1334,10 +1228,6 @@ def test_the_default_csv_returns_to_the_last_digit(
     assert counts[0] == counts[1]
 
 
-def rounded(values, digits):
-    return np.array([float(f"{x:.{digits - 1}e}") for x in values.tolist()])
-
-
 @pytest.mark.parametrize("digits, power", slow_but({(5, -4)}, [(8, -7), (5, -4)]))
 @pytest.mark.slow
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
@@ -1348,7 +1238,7 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     A number that is off by 1 % has no such line.
     """
     numbers = fourbar.solve(THESIS)
-    torque = rounded(numbers.torque, digits)
+    torque = np.array([float(f"{x:.{digits - 1}e}") for x in numbers.torque])
 
     def print_digits():
         columns = {"theta_2": numbers.theta_2, "torque": torque}

@@ -17,7 +17,6 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
-from fourbar_validation.check.theirs import read_table
 from tests.support.rows import read_rows
 from tests.support.scenes import CYLINDER, crank_rocker
 
@@ -37,18 +36,6 @@ def find_crank(scene, theta_4, side):
     along = (a * a - b * b + away * away) / (2.0 * away)
     across = side * np.sqrt(a * a - along * along)
     return np.angle((along + 1j * across) * B / away)
-
-
-@pytest.fixture
-def read(tmp_path):
-    """Reads the text of a table."""
-
-    def read_text(text, commanded="theta_2"):
-        path = tmp_path / "theirs.csv"
-        path.write_text(text)
-        return read_table(path, commanded)
-
-    return read_text
 
 
 def write(heading, *columns):
@@ -85,12 +72,7 @@ def commanding(bar, first, last, steps=8):
 
 def at_angles(angles):
     """Return the command of `commanding` at these angles."""
-    return Command(
-        np.array(angles),
-        np.ones(len(angles), np.int8),
-        2.0,
-        -1.0,
-    )
+    return Command(np.array(angles), np.ones(len(angles), np.int8), 2.0, -1.0)
 
 
 @pytest.mark.parametrize("bar, ends", [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
@@ -129,13 +111,7 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
     right = fourbar.solve(scene)
     off = right.torque * (1.0 + 1e-9 * (np.arange(25) == 7))
     for torque, lines in ((right.torque, []), (off, [9])):
-        found = judged(
-            scene,
-            "theta_4",
-            right.theta_4,
-            torque,
-            "{:.2f}",
-        )
+        found = judged(scene, "theta_4", right.theta_4, torque, "{:.2f}")
         assert [finding.line for finding in found.differing] == lines
 
 
@@ -163,14 +139,7 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judge
     limits = np.sort(fourbar.solve(scene, "position").theta_4[[0, -1]])
     theta_4 = np.radians(np.arange(*np.ceil(np.degrees(limits)), 5.0))
     assert len(theta_4) > 3
-    table = read(
-        tabulate(
-            "theta_4",
-            theta_4,
-            theta_4,
-            "{:.0f}",
-        )
-    )
+    table = read(tabulate("theta_4", theta_4, theta_4, "{:.0f}"))
     angles = find_row_commands(scene, table).at.angle
     apart = np.angle(np.exp(1j * (angles - find_crank(scene, theta_4, side))))
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
@@ -186,13 +155,7 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
     right = fourbar.solve(scene, at=at_angles([1.2, 1.7, 2.4]))
     for off, code in ((0.0, HOLDS), (1e-5, FAILED)):
         torque = right.torque * (1.0 + off)
-        found = judged(
-            scene,
-            "theta_4",
-            right.theta_4,
-            torque,
-            "{:.6f}",
-        )
+        found = judged(scene, "theta_4", right.theta_4, torque, "{:.6f}")
         assert found.status == code
 
 
@@ -200,13 +163,7 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
     scene = commanding(2, 0.0, 360.0)
     theta_4 = np.radians([120.0, 140.0])
     with raises(InputError) as caught:
-        judged(
-            scene,
-            "theta_4",
-            theta_4,
-            theta_4,
-            "{:.0f}",
-        )
+        judged(scene, "theta_4", theta_4, theta_4, "{:.0f}")
     error = str(caught.value)
     first = np.degrees(find_crank(scene, theta_4[:1], -1.0)) % 360.0
     assert f"{first[0]:.6g}" in error and "add a column theta_2" in error
