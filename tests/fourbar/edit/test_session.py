@@ -166,15 +166,14 @@ def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
 
 
 def test_the_page_has_the_angles_of_each_dead_centre(session):
+    """There the loop closes, and bars 2 and 3 are in line."""
     turns = session.answer()["data"]["turns"]
-    assert {words for words, *_ in turns} == {"dead centre: bars 2, 3 in line"}
-    for _, theta_2, theta_3, _ in turns:
-        assert math.sin(theta_3 - theta_2) == approx(0.0, abs=1e-12)
-    assert math.cos(session.now.scene.linkage.ground_angle) == 1.0
-    closes = [
-        math.sin(three) * 0.25 + math.sin(two) * 0.1 for _, two, three, _ in turns
-    ]
-    assert closes == approx([0.22 * math.sin(four) for *_, four in turns], abs=1e-9)
+    assert len(turns) == 4
+    for words, *angles in turns:
+        assert words == "dead centre: bars 2, 3 in line"
+        assert math.sin(angles[1] - angles[0]) == approx(0.0, abs=1e-12)
+        loop = np.array([0.1, 0.25, -0.22]) @ np.exp(1j * np.array(angles))
+        assert loop == approx(0.3, abs=1e-9)
 
 
 def test_a_new_tolerance_is_a_thousandth_in_the_unit_of_its_number(session):

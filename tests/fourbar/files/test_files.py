@@ -30,6 +30,7 @@ from fourbar import (
 from fourbar.files import dump, load, loads, save, scene_text
 from fourbar_validation.places import MODELS
 from tests.fourbar.test_solving import EXAMPLES, scenes
+from tests.support.refusals import refused
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
@@ -142,9 +143,8 @@ motion.theta_2 | 1e-3 | no number of the scene has this key
 )
 def test_no_tolerance_is_written_that_reading_refuses(key, width, why):
     scene = crank_rocker(tolerances=(Tolerance(key, float(width)),))
-    with raises(InputError, match=why) as refused:
+    with refused(key, why):
         dump(scene)
-    assert key in str(refused.value)
 
 
 def test_three_sigma_less_than_the_number_are_written_and_more_are_not():

@@ -14,6 +14,7 @@ from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
 from tests.support.block import read_block
+from tests.support.refusals import refused
 from tests.support.rows import read_rows
 
 EXACT = 1e-13
@@ -180,9 +181,8 @@ sine | cosine | law.kind | "sine"
     ],
 )
 def test_a_law_that_states_too_much_or_too_little_is_refused(law, words):
-    with raises(InputError) as refused:
+    with refused(*words):
         make_swing(f"{{ {law} }}")
-    assert all(word in str(refused.value) for word in words), refused.value
 
 
 @pytest.mark.parametrize("ends, other", [("free", "rest"), ("rest", "free")])

@@ -23,6 +23,7 @@ from fourbar import (
 )
 from fourbar.mjcf import write_mjcf
 from fourbar_lab.stability import compute_reference
+from tests.support.refusals import refused
 from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, recommand
 
@@ -112,13 +113,9 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
 """),
 )
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
-    with raises(InputError, match=says) as caught:
-        refused = crank_rocker(
-            motion=Motion(**json.loads(motion)),
-            drive=LinearDrive(GROUND, ENDS[2]),
-        )
-        solve(refused)
-    assert "\n" not in str(caught.value)
+    with refused(says):
+        by_stroke = Motion(**json.loads(motion))
+        solve(crank_rocker(motion=by_stroke, drive=LinearDrive(GROUND, ENDS[2])))
 
 
 def test_who_does_not_take_it_says_so():

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pytest import raises
 
-from fourbar import InputError, Tolerance, save, solve, tolerances, uniform, vary
+from fourbar import Tolerance, save, solve, tolerances, uniform, vary
 from fourbar.files import dump, loads
+from tests.support.refusals import refused
 from tests.support.rows import read_rows
 from tests.support.texts import LENGTHS
 
@@ -125,9 +125,8 @@ centre | bars.input.centre.drawn.0 | must be among bars.input.centre.0, bars.inp
 
 @pytest.mark.parametrize("name, keys, words", REFUSED)
 def test_a_key_that_cannot_vary_gets_one_line_that_names_others(name, keys, words):
-    with raises(InputError) as caught:
+    with refused(words):
         vary(loads(TEXTS[name]), {key: [0.0] for key in keys.split()})
-    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -143,16 +142,15 @@ def test_a_key_that_cannot_vary_gets_one_line_that_names_others(name, keys, word
     ],
 )
 def test_a_tolerance_of_such_a_key_gets_that_line(text, stated, words):
-    with raises(InputError) as caught:
+    with refused(words):
         loads(f"{text}{ACTS}[tolerances]\n{stated}\n")
-    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_tolerances_of_pins_are_written_and_shown(show):
     scene = replace(DRAWN, tolerances=(Tolerance("pins.O2.0", "0.05 mm"),))
     assert loads(dump(scene)) == scene
     redrawn = replace(scene, linkage=uniform(0.3, 0.1, 0.25, 0.22))
-    with raises(InputError, match="no number of the scene has this key"):
+    with refused("no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
     save(scene, "drawn.toml")
     shown = show("tolerance", "drawn.toml", "--samples", 64)

@@ -31,6 +31,7 @@ from fourbar import (
 )
 from fourbar.files import loads
 from fourbar.studies.keys import list_entries, read_place, replace_place
+from tests.support.refusals import refused
 from tests.support.rows import read_rows
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
@@ -211,9 +212,8 @@ MASSES = {"bars.coupler.mass": [1.0, 2.0]}
     ],
 )
 def test_what_cannot_vary_is_refused_in_one_line(motion, values, words):
-    with raises(InputError) as caught:
+    with refused(words):
         vary(replace(scene(), motion=motion), values)
-    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_texts_with_units_are_the_numbers():
