@@ -1,4 +1,4 @@
-"""Small pictures of a scene: marks stand where something is judged."""
+"""Pictures of a scene: marks stand where something is judged."""
 
 import re
 from dataclasses import replace
@@ -9,7 +9,7 @@ import fourbar
 from fourbar.quantities import OK
 from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.report.scene_pictures import draw_thumbnail
+from fourbar_validation.report.scene_pictures import draw_scene_figure
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.scenes.suites import MODELS
 
@@ -31,10 +31,10 @@ def list_marks(scene, solution, torque, *at):
         solution=solution,
         answers=[answer, answer],
     )
-    drawn = draw_thumbnail(record)
+    _, drawn, *_ = draw_scene_figure(record).split("</svg>")
     assert ">T₂ (N m)</text>" in drawn
     groups = re.findall(r"<g clip-path[^>]*>((?:<use [^>]*>)+)</g>", drawn)
-    of_answers = "".join(groups[1:])  # behind those of the pins
+    of_answers = "".join(groups[:2])  # before their errors
     places = re.findall(r'x="([\d.]+)" y="([\d.]+)"', of_answers)
     return [(float(x), float(y)) for x, y in places]
 
@@ -78,4 +78,4 @@ def test_where_a_curve_is_cut_a_label_says_so():
     pole[100:102] *= 1e3
     for torque, cuts in ((1e3 * WHOLE.torque, 0), (pole, 1)):
         record = Record("pole", PLAIN, solution=replace(WHOLE, torque=torque))
-        assert draw_thumbnail(record).count("towards a pole") == cuts
+        assert draw_scene_figure(record).count("towards a pole") == cuts

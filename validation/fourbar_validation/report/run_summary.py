@@ -47,7 +47,7 @@ from fourbar_validation.report.words import AlikeTexts
 
 SCENES_SHOWN = 200
 SKETCHED = 60
-"""Scenes with small pictures."""
+"""Scenes whose linkages are shown small."""
 PICTURED = 24
 """Scenes with pictures, if fewer fail. Drawing one takes ten times as long as judging
 it by an exact engine.
@@ -231,7 +231,6 @@ class Summary:
         for scene in self._shown:
             if scene.name == drawn.name:
                 scene.figure = drawn.figure
-                scene.thumbnail = drawn.thumbnail
 
     def _add_times(self, scene: Record) -> None:
         refused = {row.engine for row in scene.rows if row.verdict == REFUSES}
@@ -430,11 +429,11 @@ class Summary:
 
     @property
     def sketched(self) -> list[Record]:
-        """Return the scenes with small pictures.
+        """Return the scenes whose linkages are shown small.
 
         Scenes that fail come first, then those nearest to it.
         """
-        return [scene for scene in self._shown if scene.thumbnail][:SKETCHED]
+        return [scene for scene in self._shown if scene.figure][:SKETCHED]
 
     @property
     def first(self) -> Record | None:

@@ -3,7 +3,6 @@
 Drawn are the linkage, every engine's answer over the formulas, and the errors beneath.
 """
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -33,7 +32,6 @@ from fourbar_validation.report.svg import (
     INK,
     LEAST_DRAWN_ERROR,
     PAPER,
-    SOFT,
     choose_style,
     set_frame,
     write_svg,
@@ -84,34 +82,6 @@ def draw_scene_figure(record: Record) -> str | None:
     return drawn + "".join(
         _Curve(name, record, scene, solution).draw() for name in shown
     )
-
-
-def draw_thumbnail(record: Record) -> str | None:
-    """Draw linkage and torque as one small SVG; None where nothing assembles."""
-    from matplotlib.figure import Figure
-
-    solution = record.solution
-    scene = record.scene
-    if scene is None or solution is None or not np.any(solution.status_code == OK):
-        return None
-    figure = Figure(figsize=(3.3, 1.0), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[2.0, 3.0])
-    best = find_best_position(solution)
-    bars = scene.linkage
-    O4 = [part(bars.ground_angle) * bars.ground for part in (math.cos, math.sin)]
-    pins = np.array([[0.0, 0.0], solution.A[best], solution.B[best], O4])
-    left.plot(*pins[[0, 3]].T, color=SOFT, lw=1.0, ls="--")
-    left.plot(*pins.T, color=INK, lw=1.6, marker="o", ms=4.0)
-    left.set_aspect("equal", adjustable="datalim")
-    quantity = name_driving(scene)
-    # no torque acts on a released motion
-    if scene.motion.free is None and getattr(solution, quantity) is not None:
-        _Curve(quantity, record, scene, solution).draw_values(right, 3.0)
-        right.set_title(right.get_ylabel(), size=7.0, color=SOFT, loc="left")
-    for axes in (left, right):
-        axes.set_axis_off()
-    settle_labels(figure)
-    return write_svg(figure, f"{record.name} small")
 
 
 def find_best_position(solution: Solution) -> int:
@@ -183,7 +153,7 @@ class _Curve:
 
         figure = Figure(figsize=(4.3, 4.0), layout="constrained")
         axes = figure.subplots(2, sharex=True)
-        self.draw_values(axes[0], 5.5)
+        self.draw_values(axes[0])
         self.draw_errors(axes[1])
         unit = "error / scale" if self.quantity in FORCE_NAMES else "error (rad)"
         axes[1].set_ylabel(unit, fontsize=8.5)
@@ -206,8 +176,8 @@ class _Curve:
             return time
         return np.degrees(angle)
 
-    def draw_values(self, axes: "Axes", size: float) -> None:
-        """Draw the formulas as a band, and each engine's marks, of a size in points.
+    def draw_values(self, axes: "Axes") -> None:
+        """Draw the formulas as a band, and each engine's marks on it.
 
         The marks stand at positions of their own. Where the formulas have no value, as
         at a change point, nothing is judged, and a mark would look like an error. Near
@@ -226,7 +196,7 @@ class _Curve:
 
         ours = np.where(self.good, take(values), np.nan)
         base = self.choose_base(None)
-        axes.plot(base, ours, color=BAND, lw=0.9 * size, solid_capstyle="butt")
+        axes.plot(base, ours, color=BAND, lw=5.0, solid_capstyle="butt")
         for turn, answer in enumerate(self.answers):
             theirs = take(answer.quantities[quantity])
             if len(theirs) == len(ours):  # a simulation makes positions of its own
@@ -235,7 +205,7 @@ class _Curve:
             parts = (np.arange(MARKS_OF_A_CURVE) + phase) / MARKS_OF_A_CURVE
             places = np.unique((parts * len(theirs)).astype(int))
             x = self.choose_base(answer.at)[places]
-            axes.plot(x, theirs[places], **_mark(answer, size))
+            axes.plot(x, theirs[places], **_mark(answer, 5.5))
         low, high = np.nanpercentile(ours, [2.0, 98.0])
         span = high - low
         beyond = max(np.nanmax(ours) - high, low - np.nanmin(ours))

@@ -57,12 +57,10 @@ class Record:
     """
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
-    thumbnail: str | None = None
-    """Small SVG of linkage and torque, or None."""
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
 
-    def kept(self, figure: str | None = None, thumbnail: str | None = None) -> "Record":
+    def kept(self, figure: str | None = None) -> "Record":
         """Return a copy without the scene, the solution and the answers."""
         answers = self.answers
         return replace(
@@ -72,7 +70,6 @@ class Record:
             },
             evidence={one.engine: one.evidence for one in answers if one.evidence},
             figure=figure,
-            thumbnail=thumbnail,
             scene=None,
             solution=None,
             answers=[],

@@ -16,10 +16,7 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.rows import FORMULAS, Row
 from fourbar_validation.engines.guests import number_guests
 from fourbar_validation.engines.registry import ENGINES, Engine
-from fourbar_validation.report.scene_pictures import (
-    draw_scene_figure,
-    draw_thumbnail,
-)
+from fourbar_validation.report.scene_pictures import draw_scene_figure
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.svg import STYLE_NUMBERS
 from fourbar_validation.run.identities import check_identities, check_status
@@ -109,11 +106,10 @@ def judge_for_report(
     engines: Sequence[Engine] = ENGINES,
     *,
     draw: bool = True,
-    sketch: bool = False,
 ) -> Record:
     """Judge a scene and keep what the report needs of it.
 
-    `draw`: with its pictures. `sketch`: with its small picture.
+    `draw`: with its pictures.
     """
     record = judge(name, scene, engines)
     for i, row in enumerate(record.rows):
@@ -122,13 +118,8 @@ def judge_for_report(
                 row,
                 reason=f"{row.reason}; what it printed: {OUTPUT}",
             )
-    figure = thumbnail = None
     STYLE_NUMBERS.update(number_guests(engines))
-    if draw:
-        figure = draw_scene_figure(record)
-    if draw or sketch:
-        thumbnail = draw_thumbnail(record)
-    return record.kept(figure, thumbnail)
+    return record.kept(draw_scene_figure(record) if draw else None)
 
 
 def judge(name: str, scene: Scene, engines: Sequence[Engine] = ENGINES) -> Record:

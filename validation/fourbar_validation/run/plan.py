@@ -24,7 +24,7 @@ from fourbar_validation.engines.guests import QUESTIONS, Guest
 from fourbar_validation.engines.programs import SECONDS_PER_POSITION
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import name_code
-from fourbar_validation.report.run_summary import PICTURED, SKETCHED, Summary
+from fourbar_validation.report.run_summary import PICTURED, Summary
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run.judge import judge_for_report
 from fourbar_validation.run.store import Store
@@ -105,7 +105,6 @@ class Job:
     scene: int
     engines: Sequence[Engine]
     draw: bool
-    sketch: bool = False
 
     @property
     def name(self) -> str:
@@ -118,7 +117,6 @@ def make_jobs(
     scenes: Iterable[int],
     engines: Sequence[Engine],
     draw: bool,
-    sketch: bool = False,
 ) -> list[Job]:
     """Make the jobs of some scenes; one of a file carries its own text alone."""
     return [
@@ -126,7 +124,6 @@ def make_jobs(
             *suite.alone(i),
             engines,
             draw and suite.name(i) not in suite.not_drawn,
-            sketch,
         )
         for i in scenes
     ]
@@ -135,8 +132,7 @@ def make_jobs(
 def judge_job(job: Job) -> Record:
     """Judge one scene; runs in a worker."""
     scene = job.suite.scene(job.scene)
-    how = {"draw": job.draw, "sketch": job.sketch}
-    return judge_for_report(job.name, scene, job.engines, **how)
+    return judge_for_report(job.name, scene, job.engines, draw=job.draw)
 
 
 def _judge_by_engine(
@@ -240,11 +236,6 @@ class Plan:
         pictures = len(self.suite) - len(self.suite.not_drawn)
         return self.drawn and pictures <= PICTURED
 
-    @property
-    def sketch(self) -> bool:
-        """Return whether scenes have small pictures."""
-        return self.drawn and len(self.suite) <= SKETCHED
-
     @cached_property
     def tasks(self) -> list[range]:
         """Return the scenes of each task."""
@@ -266,7 +257,6 @@ class Plan:
             "engines": [engine.fingerprint() for engine in self.engines],
             **name_code(),
             "draw": self.draw_at_once,
-            "sketch": self.sketch,
         }
 
     @property
@@ -290,7 +280,7 @@ class Plan:
         if kept:
             progress.note(self._tell_kept(kept))
         progress.advance(JUDGING, len(kept))
-        how = self.engines, self.draw_at_once, self.sketch
+        how = self.engines, self.draw_at_once
         jobs = ((task, make_jobs(self.suite, self.tasks[task], *how)) for task in left)
         for task, records in judge_tasks(self.suite, self.engines, jobs, self.workers):
             store.put(task, [record.kept_all() for record in records])
