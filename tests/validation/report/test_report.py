@@ -236,6 +236,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     shown = {f"scene-0{number}" for number in range(80, 100)}
     assert {scene.name for scene in summary.shown} == shown
     refusal = "falls to 0.0e+00; below 0.05 it is not simulated"
+    refusal += ", with other numbers in the others"
     assert summary.refusals == [("mujoco-simulated", refusal, 100)]
     assert summary.judged == 400
     page = write_summary_page(summary)
