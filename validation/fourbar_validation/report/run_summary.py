@@ -46,7 +46,7 @@ from fourbar_validation.report.scene_record import Record
 from fourbar_validation.report.words import AlikeTexts
 
 SCENES_SHOWN = 200
-SKETCHED = 60
+SKETCHED = 8
 """Scenes whose linkages are shown small."""
 PICTURED = 24
 """Scenes with pictures, if fewer fail. Drawing one takes ten times as long as judging
