@@ -14,7 +14,7 @@ import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
-from fourbar.show.derived import derive
+from fourbar.show.columns import read_column
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.labels import add_label
@@ -34,7 +34,9 @@ from fourbar.show.plot.style import (
     place_legend,
     plot_points,
     set_degree_ticks,
+    write_force_name,
     write_labelled_quantity,
+    write_plain,
 )
 from fourbar.show.plot.view import View, collect_point_vectors
 
@@ -48,18 +50,9 @@ OUTLIER = 3.0
 """... and the multiple of it that a curve must exceed to be clipped."""
 CLIPPED = 1.6
 """A clipped axis ends at this multiple of the ordinary size."""
-_SUBSCRIPTS = {2: "₂", 3: "₃", 4: "₄"}
 _DEGREES = {"rad": ("°", math.degrees(1.0))}
-
-
-class Curve(NamedTuple):
-    """A curve of a chart."""
-
-    name: str
-    """Name in a note, and in the legend if its look has no other."""
-    values: Array
-    """Values at the positions of the sweep, (n,), SI."""
-    look: dict[str, Any]
+Looks = dict[str, tuple[str, dict[str, Any]]]
+"""Columns and the looks of their curves, by the label."""
 
 
 class Chart(NamedTuple):
@@ -69,7 +62,8 @@ class Chart(NamedTuple):
     symbol: str
     """Symbol at the upright axis."""
     unit: str
-    curves: list[Curve]
+    curves: dict[str, tuple[Array, dict[str, Any]]]
+    """Values at the positions of the sweep, (n,), SI, and look, by the label."""
     zero: str = "line"
     """A line at zero, the end of the axis there ("end"), or neither (""); an axis
     without zero is not clipped.
@@ -84,20 +78,20 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     """Draw a chart of a view over the command or over time."""
     chart = list_curves(view)
     positions = draw_axes(axes, view)
-    sizes = [curve.values for curve in chart.curves]
+    sizes = [values for values, _ in chart.curves.values()]
     limit = choose_limit(sizes) if chart.zero else None
     units = {**view.units, **_DEGREES}
     factor, unit = choose_scale(limit or largest_magnitude(*sizes), chart.unit, units)
     poles = view.axis.factor * np.array(chart.poles)
     rows = np.searchsorted(positions, poles)
     places = np.insert(positions, rows, np.nan)  # no line crosses a pole
-    for name, values, look in chart.curves:
+    for label, (values, look) in chart.curves.items():
         finite = np.where(np.isfinite(values), factor * values, np.nan)
         shown = np.insert(finite, rows, np.nan)
-        axes.plot(places, shown, **{"label": name} | look)
+        axes.plot(places, shown, label=label, **look)
     for pole in poles:
         axes.axvline(pole, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
-    if chart.poles:
+    if len(poles):
         view.note("Dotted: poles.")
     if chart.zero == "end":
         axes.set_ylim(bottom=0.0)
@@ -114,7 +108,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
         axes.set_ylim(0.0 if lowest >= 0.0 else -factor * limit, factor * limit)
         _note_largest(view, chart, limit)
     elif chart.has_peak:
-        values = sizes[0]
+        (values,) = sizes[:1]
         peak = values[find_peak_index(values)]
         text = write_labelled_quantity(peak, chart.unit, view.units)
         mark_peak(axes, positions, factor * values, text)
@@ -122,7 +116,11 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
 
 def _note_largest(view: View, chart: Chart, limit: float) -> None:
     """Say where the axis ends, and what lies beyond."""
-    name, values, *_ = max(chart.curves, key=lambda one: largest_magnitude(one.values))
+    largest_of = {
+        label: largest_magnitude(values) for label, (values, _) in chart.curves.items()
+    }
+    label = max(largest_of, key=largest_of.__getitem__)
+    values, _ = chart.curves[label]
     index = find_peak_index(values)
     words = view.axis.words(view.sweep.at.places[index], 5)
     end, largest = (
@@ -130,8 +128,8 @@ def _note_largest(view: View, chart: Chart, limit: float) -> None:
         for value in (limit, values[index])
     )
     view.note(
-        f"{chart.title} clipped at {end}; the largest evaluated, {name} = {largest},"
-        f" is at {words}."
+        f"{chart.title} clipped at {end}; the largest evaluated, {write_plain(label)} ="
+        f" {largest}, is at {words}."
     )
 
 
@@ -188,150 +186,115 @@ def mark_peak(axes: "Axes", over: Array, values: Array, text: str) -> None:
     add_label(axes, text, place, away, size=7.5)
 
 
+def make_chart(title: str, symbol: str, looks: Looks, view: View, **more: Any) -> Chart:
+    """Make the chart of columns of one unit.
+
+    Forces have the poles of the drive, and ratios those at which they change their
+    sign: it is large on both sides there, and small at a zero.
+    """
+    curves = {}
+    for label, (name, look) in looks.items():
+        column = read_column(view.sweep, name)
+        curves[label] = column.values, look
+    unit = column.unit
+    poles = []
+    if unit in ("N", "N m", "W"):
+        poles = view.poles.get(read_drive_demand(view.sweep).keys.value, [])
+    if unit == "1":
+        places = view.sweep.at.places
+        middles = 0.5 * (places[1:] + places[:-1])
+        for values, _ in curves.values():
+            least = np.minimum(np.abs(values[1:]), np.abs(values[:-1]))
+            changes = (values[1:] * values[:-1] < 0.0) & (least > 1.0)
+            poles += middles[changes].tolist()
+    return Chart(title, symbol, unit, curves, poles=poles, **more)
+
+
 def list_angles(view: View) -> Chart:
     """List the angles of the bars that are not the axis."""
     commanded = view.sweep.commanded if view.time is None else ""
     bars = [bar for bar in MOVING_BARS if f"theta_{bar}" != commanded]
-    curves = []
-    for bar in bars:
-        values = getattr(view.sweep, f"theta_{bar}")
-        curves.append(Curve(rf"$\theta_{bar}$", values, choose_bar_line(bar)))
+    looks = {rf"$\theta_{bar}$": (f"theta_{bar}", choose_bar_line(bar)) for bar in bars}
     named = "the bars"
     symbol = r"$\theta$"
     if len(bars) < 3:
-        symbol = ", ".join(curve.name for curve in curves)
+        symbol = ", ".join(looks)
         named = " and ".join(BAR_NAMES[bar] for bar in bars)
-    return Chart(f"Angles of {named}", symbol, "rad", curves, "")
+    return make_chart(f"Angles of {named}", symbol, looks, view, zero="")
 
 
-def _list_rates(view: View, letter: str, sign: str, unit: str, title: str) -> Chart:
+def _list_rates(letter: str, sign: str, title: str, view: View) -> Chart:
     """List the rates of the bars; those of the commanded bar are left out if zero."""
-    driven = view.sweep.at.bar
-    curves = []
+    looks = {}
     for bar in MOVING_BARS:
-        rate = getattr(view.sweep, f"{letter}_{bar}")
-        look = choose_bar_line(bar) | {"label": rf"$\{letter}_{bar}$"}
-        if bar == driven:
+        name = f"{letter}_{bar}"
+        look = choose_bar_line(bar)
+        if bar == view.sweep.at.bar:
             look |= {"ls": "-", "lw": 1.0}
-        if bar != driven or np.any(rate):
-            curves.append(Curve(f"{sign}{_SUBSCRIPTS[bar]}", rate, look))
-    return Chart(title, rf"$\{letter}$", unit, curves)
+            if not np.any(view.sweep[name]):
+                continue
+        looks[f"${sign}_{bar}$"] = name, look
+    return make_chart(title, f"${sign}$", looks, view)
 
 
-def _list_point_sizes(view: View, letter: str, unit: str, title: str) -> Chart:
+def _list_point_sizes(letter: str, title: str, view: View) -> Chart:
     """List the sizes at A, B, the mass centres and the scene's own points."""
     colours = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4]}
     colours |= {f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}
-    vectors = collect_point_vectors(view.scene, view.sweep, letter)
-    curves = []
-    all_dashes = cycle(("-", "--", "-.", ":"))
-    for (name, vector), dashes in zip(vectors.items(), all_dashes, strict=False):
-        look = {
-            "color": colours.get(name, FORCE_COLOURS["F43"]),
-            "ls": ":" if name[0] == "G" else dashes,
-            "lw": 2.0 if name in view.sweep.points else 1.2,
-        }
-        curves.append(Curve(name, np.hypot(*vector.T), look))
-    return Chart(title, f"$|{letter}|$", unit, curves, "end")
+    looks = {}
+    names = collect_point_vectors(view.scene, view.sweep, letter)
+    for name, dashes in zip(names, cycle(("-", "--", "-.", ":")), strict=False):
+        looks[name] = (
+            f"{letter}_{name}",
+            {
+                "color": colours.get(name, FORCE_COLOURS["F43"]),
+                "ls": ":" if name[0] == "G" else dashes,
+                "lw": 2.0 if name in view.sweep.points else 1.2,
+            },
+        )
+    return make_chart(title, f"$|{letter}|$", looks, view, zero="end")
 
 
-def _list_drive(view: View, name: str, letter: str, unit: str, what: str) -> Chart:
-    """List a quantity of the drive, with the poles of its torque or force."""
+def _list_drive(name: str, letter: str, what: str, view: View) -> Chart:
+    """List a quantity of the drive."""
     bar = view.scene.drive_bar
-    title = f"{what} of the drive"
-    symbol = letter
-    if bar:
-        title += f" on bar {bar}"
-        symbol += f"_{bar}"
-    shown = letter + _SUBSCRIPTS.get(bar, "")
-    curves = [Curve(shown, getattr(view.sweep, name), {"color": INK})]
-    has_peak = name not in view.poles
-    poles = _list_poles(view)
-    return Chart(title, f"${symbol}$", unit, curves, poles=poles, has_peak=has_peak)
-
-
-def _list_poles(view: View) -> list[float]:
-    """List the poles of the drive's torque or force, and so of the pin forces."""
-    return view.poles.get(read_drive_demand(view.sweep).keys.value, [])
+    symbol = f"${letter}_{bar}$" if bar else f"${letter}$"
+    title = f"{what} of the drive" + (f" on bar {bar}" if bar else "")
+    looks = {symbol: (name, {"color": INK})}
+    return make_chart(title, symbol, looks, view, has_peak=name not in view.poles)
 
 
 def list_demand(view: View) -> Chart:
-    """List the torque or force of the drive."""
+    """List the torque or force of the drive, and what moves a linkage at rest."""
     drive = read_drive_demand(view.sweep)
     what = "Torque" if view.scene.drive is None else "Force"
-    chart = _list_drive(view, drive.keys.value, drive.symbol[0], drive.unit, what)
+    chart = _list_drive(drive.keys.value, drive.symbol[0], what, view)
     for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
         held = getattr(view.sweep, end)
         if held is None:
             break
         apart = np.abs(held - drive.values) > 0.0
         if np.any(apart[1:] & apart[:-1]):  # one position alone is no line
-            look = {"color": MUTED, "ls": "--", "label": label}
-            chart.curves.append(Curve(end, np.where(apart, held, np.nan), look))
+            look = {"color": MUTED, "ls": "--"}
+            chart.curves[label] = np.where(apart, held, np.nan), look
     return chart
-
-
-def list_stroke(view: View) -> Chart:
-    """List the stroke of a linear drive."""
-    curves = [Curve("stroke", view.sweep["stroke"], {"color": INK})]
-    return Chart("Stroke of the drive", "stroke", "m", curves, "")
-
-
-def list_forces(view: View) -> Chart:
-    """List the magnitudes of the four pin forces."""
-    curves = []
-    for name in FORCE_COLOURS:
-        size = np.hypot(*getattr(view.sweep, name).T)
-        curves.append(Curve(name, size, choose_force_line(name)))
-    return Chart("Pin forces", "$|F|$", "N", curves, "end", poles=_list_poles(view))
 
 
 def list_energies(view: View) -> Chart:
     """List the kinetic energy of a free motion, and the work that made it."""
     energies = compute_energies(view.scene, view.sweep)
-    curves = [Curve("kinetic", energies.kinetic, {"color": INK, "lw": 2.2})]
+    curves = {"kinetic": (energies.kinetic, {"color": INK, "lw": 2.2})}
     # the cycles differ in length: twelve curves look different
     looks = zip(cycle(FORCE_COLOURS.values()), cycle(BAR_DASHES.values()), strict=False)
     for (name, values), (colour, dashes) in zip(
         energies.work.items(), looks, strict=False
     ):
-        look = {"color": colour, "ls": dashes}
-        curves.append(Curve(name.replace("_", " "), values, look))
+        curves[name.replace("_", " ")] = values, {"color": colour, "ls": dashes}
     view.note(
         "The kinetic energy has grown by the work that loads and effects have done"
         " since the release."
     )
     return Chart("Kinetic energy and work", "energy", "J", curves)
-
-
-def list_shaking_force(view: View) -> Chart:
-    """List the size of the force on the frame, and its components."""
-    x, y = derive(view.sweep, "shaking_force").T
-    curves = [
-        Curve("$|F|$", np.hypot(x, y), {"color": INK}),
-        Curve("$F_x$", x, {"color": BAR_COLOURS[2], "ls": (0, (4, 1.5))}),
-        Curve("$F_y$", y, {"color": BAR_COLOURS[4], "ls": (0, (1, 1))}),
-    ]
-    title = "Shaking force on the frame"
-    return Chart(title, "$F$", "N", curves, poles=_list_poles(view))
-
-
-def _list_derived(
-    view: View, names: dict[int, tuple[str, str]], unit: str, symbol: str, title: str
-) -> Chart:
-    """List derived quantities, by the bars in whose colours they are drawn."""
-    curves = []
-    poles = [] if unit == "1" else _list_poles(view)
-    for bar, (name, quantity) in names.items():
-        values = derive(view.sweep, quantity)
-        curves.append(Curve(name, values, choose_bar_line(bar)))
-        if unit == "1":
-            # a ratio changes its sign at a pole, where it is large, or at zero
-            least = np.minimum(np.abs(values[1:]), np.abs(values[:-1]))
-            changes = (values[1:] * values[:-1] < 0.0) & (least > 1.0)
-            places = view.sweep.at.places
-            poles += (0.5 * (places[1:] + places[:-1]))[changes].tolist()
-    return Chart(title, symbol, unit, curves, poles=poles)
 
 
 _RECOMMENDED = 40.0
@@ -343,65 +306,50 @@ Source: R. L. Norton, Design of Machinery; H. Alt introduced the angle (1932).
 
 def list_transmission(view: View) -> Chart:
     """List the acute angle between coupler and output, and the least one wanted."""
-    mu = derive(view.sweep, "transmission")
-    least = np.full(len(mu), math.radians(_RECOMMENDED))
+    looks: Looks = {"transmission angle": ("transmission", {"color": INK})}
+    chart = make_chart("Transmission angle", r"$\mu$", looks, view, zero="end")
+    least = np.full(len(view.sweep), math.radians(_RECOMMENDED))
     thin = {"color": MUTED, "lw": 0.9, "ls": (0, (4, 2))}
-    curves = [
-        Curve("transmission angle", mu, {"color": INK}),
-        Curve(f"{_RECOMMENDED:g}° recommended", least, thin),
-    ]
-    return Chart("Transmission angle", r"$\mu$", "rad", curves, "end")
+    chart.curves[f"{_RECOMMENDED:g}° recommended"] = least, thin
+    return chart
 
 
+_FORCE_LOOKS: Looks = {
+    write_force_name(name): (name, choose_force_line(name)) for name in FORCE_COLOURS
+}
+_SHAKING_LOOKS: Looks = {
+    "$|F|$": ("shaking_force", {"color": INK}),
+    "$F_x$": ("shaking_force_x", {"color": BAR_COLOURS[2], "ls": (0, (4, 1.5))}),
+    "$F_y$": ("shaking_force_y", {"color": BAR_COLOURS[4], "ls": (0, (1, 1))}),
+}
+_STROKE_LOOKS: Looks = {"stroke": ("stroke", {"color": INK})}
+_MOMENT_LOOKS: Looks = {"M": ("shaking_moment", choose_bar_line(2))}
+_RATIO_LOOKS: Looks = {
+    "ω₃/ω₂": ("omega_3/omega_2", choose_bar_line(3)),
+    "ω₄/ω₂": ("omega_4/omega_2", choose_bar_line(4)),
+}
+_ADVANTAGE_LOOKS: Looks = {"T₄/T₂": ("mechanical_advantage", choose_bar_line(2))}
 CHARTS: dict[str, Callable[[View], Chart]] = {
     "angles": list_angles,
-    "omega": partial(
-        _list_rates,
-        letter="omega",
-        sign="ω",
-        unit="rad/s",
-        title="Angular velocities",
-    ),
-    "alpha": partial(
-        _list_rates,
-        letter="alpha",
-        sign="α",
-        unit="rad/s^2",
-        title="Angular accelerations",
-    ),
-    "speeds": partial(
-        _list_point_sizes, letter="v", unit="m/s", title="Speeds of points"
-    ),
-    "accelerations": partial(
-        _list_point_sizes, letter="a", unit="m/s^2", title="Accelerations of points"
-    ),
+    "omega": partial(_list_rates, "omega", "ω", "Angular velocities"),
+    "alpha": partial(_list_rates, "alpha", "α", "Angular accelerations"),
+    "speeds": partial(_list_point_sizes, "v", "Speeds of points"),
+    "accelerations": partial(_list_point_sizes, "a", "Accelerations of points"),
     "drive": list_demand,
     "energy": list_energies,
-    "power": partial(_list_drive, name="power", letter="P", unit="W", what="Power"),
-    "stroke": list_stroke,
-    "forces": list_forces,
+    "power": partial(_list_drive, "power", "P", "Power"),
+    "stroke": partial(
+        make_chart, "Stroke of the drive", "stroke", _STROKE_LOOKS, zero=""
+    ),
+    "forces": partial(make_chart, "Pin forces", "$|F|$", _FORCE_LOOKS, zero="end"),
     "mu": list_transmission,
-    "shaking force": list_shaking_force,
+    "shaking force": partial(
+        make_chart, "Shaking force on the frame", "$F$", _SHAKING_LOOKS
+    ),
     "shaking moment": partial(
-        _list_derived,
-        names={2: ("M", "shaking_moment")},
-        unit="N m",
-        symbol="$M$",
-        title="Shaking moment about O₂",
+        make_chart, "Shaking moment about O₂", "$M$", _MOMENT_LOOKS
     ),
-    "ratios": partial(
-        _list_derived,
-        names={3: ("ω₃/ω₂", "omega_3/omega_2"), 4: ("ω₄/ω₂", "omega_4/omega_2")},
-        unit="1",
-        symbol="ratio",
-        title="Speed ratios",
-    ),
-    "advantage": partial(
-        _list_derived,
-        names={2: ("T₄/T₂", "mechanical_advantage")},
-        unit="1",
-        symbol="T₄/T₂",
-        title="Mechanical advantage",
-    ),
+    "ratios": partial(make_chart, "Speed ratios", "ratio", _RATIO_LOOKS),
+    "advantage": partial(make_chart, "Mechanical advantage", "T₄/T₂", _ADVANTAGE_LOOKS),
 }
 """What the charts list, in the order in which their notes are written."""

@@ -1,6 +1,5 @@
 """Free-body diagrams of the three moving bars, all forces to one scale."""
 
-import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ from fourbar.show.plot.style import (
     write_force_name,
     write_labelled_quantity,
     write_pin_name,
+    write_plain,
 )
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.shown_units import choose_unit
@@ -264,8 +264,7 @@ def _draw_one(
         size = abs(arrow.force)
         text = f"{arrow.text} = {write_labelled_quantity(size, 'N', view.units)}"
         if size < LEAST_DRAWN_FORCE * biggest:
-            plain = re.sub(r"[$_{}]", "", text.replace("\\,", " "))
-            short.append(plain.replace("-", "−"))
+            short.append(write_plain(text))
             continue
         draw_plate(axes, bar, (start, arrow.at, end))
         shaft = scale * arrow.force

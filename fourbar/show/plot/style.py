@@ -6,6 +6,7 @@ Drawings use matplotlib's object interface and leave no global state behind.
 import io
 import logging
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,10 +60,9 @@ def choose_bar_line(bar: int) -> dict[str, Any]:
 
 
 def choose_force_line(name: str) -> dict[str, Any]:
-    """Return the style and the label of the curve of a pin force."""
+    """Return the style of the curve of a pin force."""
     dashes, width = _FORCE_LINES[name]
-    look = {"color": FORCE_COLOURS[name], "ls": dashes, "lw": width}
-    return look | {"label": write_force_name(name)}
+    return {"color": FORCE_COLOURS[name], "ls": dashes, "lw": width}
 
 
 def write_force_name(name: str) -> str:
@@ -73,6 +73,11 @@ def write_force_name(name: str) -> str:
 def write_pin_name(name: str) -> str:
     """Write the name of a pin, or another letter with its index, as it is typeset."""
     return "$" + "_".join(name) + "$"
+
+
+def write_plain(text: str) -> str:
+    """Write a text for a caption, which is not typeset."""
+    return re.sub(r"[$_{}]", "", text.replace("\\,", " ")).replace("-", "−")
 
 
 _AT_EDGE: dict[str, Any] = {"parse_math": False, "x": 0.012, "ha": "left"}
