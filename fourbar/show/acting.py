@@ -1,7 +1,6 @@
 """Remarks on what acts: couples without a place, and springs that go on too far."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +12,7 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
 from fourbar.quantities import CHANGE_POINT, WOUND, Array
-from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
@@ -134,21 +133,13 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
     springs = list_springs(scene)
     if not springs:
         return []
-    at = solution.at
-
-    def command_between(places: Array) -> Command:
-        if at.moves_stroke:
-            return command_at(scene, places)
-        branch = np.full(places.shape, at.branch[0])
-        return Command(places, branch, None, 0.0, at.bar)
-
+    course = None
     is_whole = solution.command_at is not None
     if not is_whole and goes_on_between(scene, solution):
-        is_whole = {*command(scene).places[[0, -1]]} == {*at.places[[0, -1]]}
+        is_whole = {*command(scene).places[[0, -1]]} == {*solution.at.places[[0, -1]]}
     if is_whole:
         course = MotionCourse(scene, "position", solution)
         solution = course.solution
-        command_between = course.command
     notes = []
     for number, spring in enumerate(springs, 1):
         distance = measure_end_distance(scene, spring, solution.at)
@@ -158,9 +149,7 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
             # a spring that pulls throughout may be one that does
             if not beyond.any() or (room == 0.0 and not (distance < end).any()):
                 continue
-            stretches = _list_stretches(
-                scene, command_between, solution, spring, end, beyond
-            )
+            stretches = _list_stretches(course, solution, spring, end, beyond)
             where = " and ".join(
                 write_stretch(solution, one, units) for one in stretches
             )
@@ -175,34 +164,28 @@ def list_torsion_notes(
     solution: Solution,
     units: Conversion,
 ) -> list[str]:
-    """Say how far torsion springs are wound at one position, and from what line.
+    """Say which torsion springs are half a turn or more from rest, and where.
 
-    Of a motion it is said where springs are wound too far, and that springs on the
-    ground count from its line, where that is not along x: the angle at O2 is not
-    theta_2 then.
+    Of one position it is said how far each is wound, and from what line.
     """
-    write = partial(write_short, unit="rad", units=units, digits=POSITION_DIGITS)
     effects = scene.settled().effects
     torsions = [effect for effect in effects if isinstance(effect, Torsion)]
     springs = [row for effect in torsions for row in effect.springs]
-    theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
-    on_ground = [pin for pin, *_ in springs if PINS[pin][0] == 1]
-    turned = on_ground and abs(theta_1) >= SAME_POSITION
-    lies = f"the ground's line, which lies at {write(theta_1)}" if turned else ""
     notes = _list_wound(scene, solution, springs, units)
-    if len(solution) > 1 or not solution.assembled[0] or notes:
-        if lies:
-            one = f"torsion spring{'s' if len(on_ground) > 1 else ''}"
-            notes.append(f"{one} at {' and '.join(on_ground)}: rest counts from {lies}")
+    if notes or len(solution) > 1 or not solution.assembled[0]:
         return notes
+    write = partial(write_short, unit="rad", units=units, digits=POSITION_DIGITS)
+    lines = {1: "the ground's line", 2: "the line of bar 2", 3: "the line of bar 3"}
+    theta_1 = math.remainder(scene.linkage.ground_angle, TURN)
+    if abs(theta_1) >= SAME_POSITION:
+        lines[1] += f", which lies at {write(theta_1)}"
     state = compute_shown_state(scene, solution.at)
     windings = [wound for effect in torsions for wound in effect.list_windings(state)]
     for winding, (pin, _, rest, _) in zip(windings, springs, strict=True):
         wound = np.ravel(winding)[0]
-        i = PINS[pin][0]
         shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
         angle, by = map(write, shown)
-        line = f"the line of bar {i}" if i > 1 else lies or "the ground's line"
+        line = lines[PINS[pin][0]]
         notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
     return notes
 
@@ -269,8 +252,7 @@ def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
 
 
 def _list_stretches(
-    scene: Scene,
-    command_between: Callable[[Array], Command],
+    course: MotionCourse | None,
     solution: Solution,
     spring: Spring,
     end: float,
@@ -280,24 +262,34 @@ def _list_stretches(
 
     A step in which nothing lies between the two positions ends at the one that is
     beyond: steps of a list, and those where the loop does not close.
+
+    `course`: of the motion that the solution goes through; None where there is none,
+    and other angles alone can lie between the positions.
     """
     at = solution.at
-
-    def is_longer(there: Array) -> NDArray[np.bool_]:
-        distance = measure_end_distance(scene, spring, command_between(there))
-        return np.greater(distance, end)
+    is_listed = isinstance(solution.scene.motion.angle, np.ndarray)
+    stands_alone = is_listed or at.moves_stroke or at.time is not None
 
     def locate(rows: NDArray[np.intp], ends: Array) -> Array:
         passes = solution.assembled[rows] & solution.assembled[rows + 1]
-        if isinstance(scene.motion.angle, np.ndarray) or not passes.any():
+        if not passes.any() or (course is None and stands_alone):
             return ends
+        before = at.part(rows[passes])._replace(origin=None)
+
+        def is_longer(there: Array) -> NDArray[np.bool_]:
+            between = before._replace(angle=there)
+            if course is not None:
+                between = course.command(there)
+            distance = measure_end_distance(solution.scene, spring, between)
+            return np.greater(distance, end)
+
         low, high = (at.places[rows[passes] + after] for after in (0, 1))
-        before = is_longer(low)
-        low, high = bisect(lambda there: is_longer(there) == before, low, high)
+        longer = is_longer(low)
+        low, high = bisect(lambda there: is_longer(there) == longer, low, high)
         ends[passes] = 0.5 * (low + high)
         return ends
 
-    return list_stretches(beyond, at.places, locate)
+    return list_stretches(beyond, solution.at.places, locate)
 
 
 def write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:

@@ -13,7 +13,6 @@ from fourbar.formulas.mobility import (
     TURN,
     change_points,
     classify,
-    find_intervals,
     find_miss,
     list_met_equalities,
     name_assembly,
@@ -390,26 +389,11 @@ class SceneBlock(Facts):
             begin = f"{name} {self._write_swing(bar)} by a law over {over} s"
         else:
             name = "stroke" if self.unit == "m" else name
-            begin = f"{name} from {start} to {stop}{self._write_inset()}"
+            begin = f"{name} from {start} to {stop}"
         swings = [
             f"{BAR_NAMES[other]} {self._write_swing(other)}" for other in following
         ]
         return "; ".join([begin, *swings])
-
-    def _write_inset(self) -> str:
-        """Write how far a range that the scene leaves out stays inside the limits."""
-        motion = self.scene.motion
-        stated = motion.angle is not None or motion.stroke is not None
-        if stated or turns_fully(self.linkage, motion.bar):
-            return ""
-        first, last = self.ends
-        inset = min(
-            (first - low) % TURN
-            for low, high in find_intervals(self.linkage, motion.bar)
-            if (first - low) % TURN <= high - low
-        )
-        inside, low, high = map(self._angle, (inset, first - inset, last + inset))
-        return f", {inside} inside its limits {low} and {high}"
 
     def _write_swing(self, bar: int) -> str:
         low, high = self.angles[bar]

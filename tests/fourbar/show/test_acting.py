@@ -134,7 +134,6 @@ TOLD = [
         torsion(-20, AT_50, B=70),
         "at B: wound by 0 deg, at 70 deg from the line of bar 3",
     ),
-    (torsion(-20, SWEEP, O2=9, O4=9), f"springs at O2 and O4: rest counts {FROM_LINE}"),
     (torsion(0, SWEEP, O2=9), "!torsion"),
     (torsion(-20, SWEEP, A=9), "!torsion"),
     (

@@ -360,16 +360,6 @@ SAID = {
         ],
         "of these positions",
     ),
-    "a range that is left out": (
-        move(LIMITED, omega_2=1.0),
-        [f"1 deg inside its limits {write(-LIMIT)} and {write(LIMIT)}; "],
-        "change point",
-    ),
-    "that range as it is stated": (
-        move(LIMITED, theta_2=Sweep(radians(1.0) - LIMIT, LIMIT - radians(1.0), 72)),
-        ["input from"],
-        "inside its limits",
-    ),
     "a lamp that a spring balances": (
         balanced_lamp(0.0),
         [" torque peak 0 N m at ", "RMS 0 N m", "the torque is zero within rounding"],
@@ -384,7 +374,6 @@ QUICK = {*FILES, *SAID} - {
     "both turns of one change point",
     "a release over change points",
     "a release of equal halves, each of which its arm carries",
-    "a range that is left out",
 }
 
 
