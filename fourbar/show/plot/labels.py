@@ -26,15 +26,9 @@ _NEAR = 10.0
 """Distance of a label's middle from its point until it is settled. This and the other
 distances are in typographic points.
 """
-_REACH = (7.0, 11.0, 16.0, 23.0, 32.0, 44.0, 60.0)
+_REACH = (7.0, 11.0, 16.0, 23.0)
 """Distances from the point to the label's edge that are tried."""
 LABEL_DIRECTIONS = 24
-_LED = 15.0
-"""Distance from which a label is led to its point by a thin line."""
-_COST_OF_A_LEADER = 3.0
-"""What a led label costs beside one that stands near but less outward, or that touches
-a thin line: as much as three dots of that line.
-"""
 POINT_DISTANCE = 2.5
 """Distance of the dots along a line."""
 _MARGIN = 2.5
@@ -97,10 +91,6 @@ class _Room:
         self.renderer = renderer
         self.per_point = float(renderer.points_to_pixels(1.0))
         """Pixels of a typographic point."""
-        self.boxes: list[Any] = []
-        """Boxes of texts."""
-        self.leaders: list[Any] = []
-        """Paths of the lines that lead labels to their points."""
         self.dots = np.empty(0, complex)
         """Points of lines, marks and texts."""
         self.weights = np.empty(0)
@@ -140,18 +130,13 @@ class _Room:
         return np.asarray(np.interp(places, along, corners))
 
     def add_box(self, box: Any) -> None:
-        """Add the box of a text, which no label should cover and no leader cross."""
-        self.boxes.append(box)
+        """Add the box of a text, which no label should cover."""
         for height in np.linspace(box.y0, box.y1, 3):
             row = self.sample([(box.x0, height), (box.x1, height)])
             self.keep_off(row, _TEXT_WEIGHT)
 
     def place(self, label: Any) -> None:
-        """Place a label where it covers least, near and outward.
-
-        A leader crosses neither a text nor another leader.
-        """
-        from matplotlib.path import Path
+        """Place a label where it covers least, near and outward."""
         from matplotlib.transforms import Bbox
 
         point = complex(*self.axes.transData.transform(label.xy))
@@ -173,25 +158,12 @@ class _Room:
             corners = point + offset - half, point + offset + half
             box = Bbox(split_points(corners))
             is_whole = self.axes.bbox.count_contains(box.corners()) == 4
-            end = np.clip(split_complex(point), box.min, box.max)
-            leader = Path(np.array([split_complex(point), end]))
             cost = float(covers @ self.weights) + 30.0 * (not is_whole)
             cost += 0.04 * reach + 0.05 * k
-            cost += 200.0 * sum(led.intersects_bbox(box) for led in self.leaders)
-            if reach > _LED:
-                crossed = sum(map(leader.intersects_bbox, self.boxes))
-                crossed += sum(map(leader.intersects_path, self.leaders))
-                cost += _COST_OF_A_LEADER + 200.0 * crossed
             if cost < least:
                 least = cost
-                best = offset, box, leader, reach
-        offset, box, leader, reach = best
+                best = offset, box
+        offset, box = best
         label.set_ha("center")
         label.xyann = split_complex(offset / self.per_point)
         self.add_box(box)
-        if reach > _LED:
-            self.leaders.append(leader)
-            ends = self.axes.transData.inverted().transform(leader.vertices)
-            # the limits stay, by which the labels were placed
-            look = {"color": label.get_color(), "lw": 0.5, "zorder": 8.5}
-            self.axes.plot(*ends.T, scalex=False, scaley=False, **look)

@@ -7,7 +7,7 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, cycle, product
+from itertools import cycle, product
 from math import atan2, degrees, hypot, pi, radians, tau
 
 import matplotlib
@@ -228,20 +228,13 @@ def test_no_texts_overlap_whatever_moves(scene, name):
         ],
     ),
 )
-def test_a_leader_crosses_no_text_and_no_leader_and_no_text_stands_on_a_bar(
-    name, dimensions
-):
+def test_no_text_stands_on_a_support_or_a_bar(name, dimensions):
     scene = load(GALLERY / f"{name}.toml")
     figure = draw_figure(scene, "linkage", dimensions=dimensions).figure
     (axes,) = figure.axes
     paths = [(x, x.get_path().transformed(axes.transData)) for x in axes.lines]
     bars = [path for line, path in paths if line.get_linewidth() > 4.0]
-    leaders = [path for line, path in paths if line.get_zorder() == 8.5]
     boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(
-        leader.intersects_bbox(box) for leader, box in product(leaders, boxes)
-    )
-    assert not any(one.intersects_path(two) for one, two in combinations(leaders, 2))
     hatched = [patch.get_window_extent() for patch in axes.patches if patch.get_hatch()]
     assert len(hatched) == 2
     assert not any(box.overlaps(other) for box, other in product(boxes, hatched))
@@ -251,8 +244,6 @@ def test_a_leader_crosses_no_text_and_no_leader_and_no_text_stands_on_a_bar(
         assert not any(
             bar.intersects_bbox(box, False) for bar, box in product(bars, wide)
         )
-    else:
-        assert leaders
 
 
 MOVING = {
@@ -332,7 +323,7 @@ def test_the_largest_of_what_is_clipped_may_be_commanded():
     law = Law((0.0, 1.0, 1.01, 3.0), (0.1, 0.2, 1.2, 1.3), omega_2=(0.0,) * 4)
     figure = composed(crank_rocker(motion=Motion(law=law)), "kinematics")
     words = " ".join(text.get_text() for text in figure.findobj(Text))
-    assert "the largest evaluated, ω₂\xa0=" in words.replace("\n", " ")
+    assert "the largest evaluated, ω2\xa0=" in words.replace("\n", " ")
 
 
 def test_an_ordinary_curve_is_not_clipped():
@@ -391,7 +382,7 @@ def test_what_stands_at_an_axis_is_whole():
             assert legend.get_window_extent().x1 <= figure.bbox.x1
     names = [axes.get_ylabel() for axes in figure.axes]
     fastest = np.abs([solve(scene).alpha_3, solve(scene).alpha_4]).max()
-    assert f"{fastest:.0e}".endswith("e-09") and r"$\alpha$ (10⁻⁹ rad/s²)" in names
+    assert f"{fastest:.0e}".endswith("e-09") and "$α$ (10⁻⁹ rad/s²)" in names
     assert "Linkage at θ₂ = 0°" in figure.axes[0].get_title("left")
 
 
