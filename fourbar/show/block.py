@@ -45,7 +45,7 @@ from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import acts, find_drive_rounding
-from fourbar.show.panels import TIED
+from fourbar.show.panels import LOWER, TIED, UPPER
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import (
     COMMON,
@@ -588,7 +588,7 @@ class SceneBlock(Facts):
     def _write_peak_power(self, peak: float) -> str:
         """Write the largest power; if the drive brakes there, say what drives too."""
         panels = self.motion.panels
-        driving = max(panels.find_peak("power", 1).value, 0.0)
+        driving = max(panels.find_peak("power", UPPER).value, 0.0)
         text = self._value(peak, "W")
         if driving >= (1.0 - TIED) * peak:
             return text
@@ -658,11 +658,11 @@ class SceneBlock(Facts):
         panels = self.motion.panels
         solution = self.motion.solve_between()
         parts = []
-        for sense, end, does in (
-            (1, LINE.high, " to push"),
-            (-1, LINE.low, ", and the rod's area besides, to pull"),
+        for sense, rank, end, does in (
+            (1.0, UPPER, LINE.high, " to push"),
+            (-1.0, LOWER, LINE.low, ", and the rod's area besides, to pull"),
         ):
-            force = sense * panels.find_peak(LINE.value, sense).value
+            force = sense * panels.find_peak(LINE.value, rank).value
             if (ends := getattr(solution, end)) is not None:
                 force = max(force, np.nanmax(sense * ends))
             if force > 0.0:

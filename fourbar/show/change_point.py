@@ -1,17 +1,16 @@
 """Pin forces on a change point: the limits to which they tend along the assembly."""
 
-import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
-from fourbar.scene import Command, command_at
+from fourbar.scene import Command, Scene, command_at
 from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -26,6 +25,7 @@ _ONE_SIDE = np.array([1.0, 2.0, 3.0, 2.0, 4.0, 6.0])
 """
 MULTIPLES = np.concatenate([-_ONE_SIDE, _ONE_SIDE])
 """Multiples of the step on both sides, by side, parabola and place."""
+_RISING, _ORDER = np.unique(MULTIPLES, return_inverse=True)
 SAME_LIMIT = 1e-6
 """Part of the forces within which four extrapolations are one limit: as is shown."""
 ZERO_LIMIT = 1e-9
@@ -42,15 +42,15 @@ def find_limits(solution: Solution) -> tuple[Solution, str]:
     """
     if solution.F12 is None or solution.status_code[0] != CHANGE_POINT:
         return solution, ""
-    rising, order = np.unique(MULTIPLES, return_inverse=True)
-    places = _list_places(solution, rising)
-    if places is None:
+    scene = solution.scene
+    limits = _extrapolate_forces(
+        scene, solution.at, lambda times: release_at(scene, times).command
+    )
+    if limits is None:
         return solution, (
             "on the change point pin forces have no value: the motion begins, ends or"
             " stands still there, and has one side alone"
         )
-    beside = solve(solution.scene, "force", at=places)
-    limits = _extrapolate_forces(beside, order)
     bounded = [np.isfinite(limit).all() for limit in limits.values()]
     said = "on the change point no pin force has a limit"
     if any(bounded):
@@ -68,65 +68,63 @@ def has_growing_forces(solution: Solution) -> bool:
 
     `solution`: of the release, over time.
     """
-    assert solution.time is not None
-    assert solution.command_at is not None
-    instants = np.array([0.0, *(solution.change_points or ())])
-    speed = np.asarray(solution.command_at(instants).speed, dtype=float)
-    # a motion that comes to rest before it meets the last of them has fewer instants
-    instants = instants[: len(speed)]
-    moving = speed != 0.0
-    time_steps = ANGLE_STEP / np.abs(speed[moving])
-    times = instants[moving, None] + time_steps[:, None] * MULTIPLES
-    within_motion = (times >= 0.0) & (times <= solution.time[-1])
-    times = times[within_motion.all(axis=1)]
-    # the release begins at time 0, which is the first row
-    rising, rows = np.unique([0.0, *times.ravel()], return_inverse=True)
-    beside = solve(solution.scene, "force", at=solution.command_at(rising))
-    for rows_of_one in rows[1:].reshape(times.shape):
-        limits = _extrapolate_forces(beside, rows_of_one)
-        if np.isnan([*limits.values()]).any():
+    command_of_run = solution.command_at
+    assert command_of_run is not None
+    for instant in solution.change_points or ():
+        at = command_of_run(np.array([0.0, instant])).part(slice(1, None))
+        limits = _extrapolate_forces(solution.scene, at, command_of_run)
+        if limits is not None and np.isnan([*limits.values()]).any():
             return True
     return False
 
 
-def _list_places(solution: Solution, multiples: Array) -> Command | None:
+def _list_places(
+    scene: Scene, at: Command, command_of_run: Callable[[Array], Command]
+) -> Command | None:
     """List the positions at multiples of the step, which rise; None without a side.
 
     Along a motion over time the bar has the speed and acceleration of each instant.
     """
-    scene = solution.scene
-    at = solution.at
     law = scene.motion.law
-    if law is None and scene.motion.free is None:
+    free = scene.motion.free
+    if law:
+        begin, *_, end = law.time
+    elif free:
+        begin, end = 0.0, free.duration
+    else:
         # a stroke changes by as much as turns its bar by the step; an angle has turn 1
         here = float(at.places[0])
         _, turn, *_ = compute_bar_motion(scene, here, 1.0, 0.0)
         with suppress(InputError):  # a cylinder at an end of its range
-            return command_at(scene, here + ANGLE_STEP / abs(turn) * multiples)
+            return command_at(scene, here + ANGLE_STEP / abs(turn) * _RISING)
         return None
-    speed = abs(float(np.ravel(np.asarray(at.speed, dtype=float))[0]))
-    if speed == 0.0:
+    # a motion that comes to rest before has fewer instants
+    speed = np.abs(np.ravel(np.asarray(at.speed, dtype=float))[:1])
+    if not speed.any():
         return None
-    times = at.places[0] + ANGLE_STEP / speed * multiples
-    begin, *_, end = law.time if law else (0.0, math.inf)
+    times = at.places[0] + ANGLE_STEP / speed * _RISING
     if times[0] < begin or times[-1] > end:
         return None
     if law:
         return command_at(scene, times)
-    released = release_at(scene, np.array([0.0, *times])).command
-    # one that comes to rest before has fewer instants
-    return released.part(slice(1, None)) if len(released.angle) > len(times) else None
+    beside = command_of_run(np.array([0.0, *times])).part(slice(1, None))
+    return beside if len(beside.angle) == len(times) else None
 
 
-def _extrapolate_forces(beside: Solution, rows: NDArray[np.intp]) -> dict[str, Array]:
-    """Extrapolate the pin forces to a change point, each (2,); NaN without a limit.
+def _extrapolate_forces(
+    scene: Scene, at: Command, command_of_run: Callable[[Array], Command]
+) -> dict[str, Array] | None:
+    """Extrapolate the pin forces to a change point from positions on both sides.
 
-    Parameters
-    ----------
-    beside : positions on both sides of it.
-    rows : those at the `MULTIPLES` of the step.
+    Returned are vectors, (2,), NaN without a limit; None without a side.
+
+    `command_of_run`: command of a release at other times, which rise from 0.
     """
-    forces = np.array([getattr(beside, name)[rows] for name in PIN_FORCES])
+    places = _list_places(scene, at, command_of_run)
+    if places is None:
+        return None
+    beside = solve(scene, "force", at=places)
+    forces = np.array([getattr(beside, name)[_ORDER] for name in PIN_FORCES])
     # by force, side, parabola, multiple of the step and component
     values = forces.reshape(len(PIN_FORCES), 2, 2, 3, 2)
     size = np.abs(values[:, :, 1, -1]).max()

@@ -83,6 +83,9 @@ _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
 """Matrix from the values at the nodes to the polynomial where it is checked."""
 _EVALUATED = np.concatenate((_CHECKED[:1], _X, _CHECKED[1:]))
 
+UPPER, LOWER = np.positive, np.negative
+"""Ranks of the values of a curve by which the largest, or the least, is its peak."""
+
 ComputeCurves = Callable[[Array], dict[str, Array]]
 """Compute curves at places (n,), by name, each (n,) or (n, k): k components."""
 
@@ -282,17 +285,13 @@ class Panels:
         stop = self.stop[panel]
         return np.asarray(0.5 * (start + stop) + 0.5 * (stop - start) * x)
 
-    def find_peak(self, name: str, sense: int = 0) -> Peak:
-        """Find the largest value of a curve (1), the least (-1), or largest size (0).
+    def find_peak(self, name: str, rank: Callable[[Array], Array] = np.abs) -> Peak:
+        """Find the value of a curve that ranks highest: that of the largest size.
 
         Of equal ones it is the first. A signed curve keeps the sign of its value.
         """
         curve = self.curves[name]
         sizes = curve.sizes
-
-        def rank(values: Array) -> Array:
-            return np.abs(values) if sense == 0 else sense * values
-
         at_nodes = np.where(np.isfinite(sizes), rank(sizes), -np.inf)
         scale = np.nanmax(np.abs(sizes))
         best = at_nodes.max(axis=1)

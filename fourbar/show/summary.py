@@ -23,11 +23,12 @@ from fourbar.show.driving import (
 )
 from fourbar.show.duty import MotorDuty, motor_duty
 from fourbar.show.motion_curves import (
+    MotionCurves,
     compute_bending,
     compute_pin_loads,
     describe_motion,
 )
-from fourbar.show.panels import EXTREME_ERROR, TIED, PanelCurve, Peak, split_runs
+from fourbar.show.panels import EXTREME_ERROR, LOWER, TIED, UPPER, Peak, split_runs
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
@@ -79,13 +80,14 @@ class Facts:
     ----------
     solution : of a scene, solved up to the forces or the error bars; at least one
         position assembles.
+    motion : curves over the motion, with what grows without bound; left out: those of
+        `describe_motion`.
     """
 
-    def __init__(self, solution: Solution) -> None:
+    def __init__(self, solution: Solution, motion: MotionCurves | None = None) -> None:
         self.solution = solution
         self.scene = solution.scene
-        self.motion = describe_motion(solution)
-        """Curves over the motion, with what grows without bound."""
+        self.motion = motion or describe_motion(solution)
 
     @cached_property
     def kind(self) -> str:
@@ -126,7 +128,7 @@ class Facts:
 
     def _find_range(self, name: str) -> tuple[Peak, Peak]:
         positions = self.motion.positions
-        return positions.find_peak(name, -1), positions.find_peak(name, 1)
+        return positions.find_peak(name, LOWER), positions.find_peak(name, UPPER)
 
     @cached_property
     def drive(self) -> Driving | None:
@@ -167,10 +169,8 @@ class Facts:
             return Peak(0.0, float(solution.at.places[0]))
         if panels.located and len(zeros := panels.find_zeros("sin_mu")):
             return Peak(0.0, float(zeros[0]))
-        sines = panels.curves["sin_mu"]
         # between two stretches it may change its sign without a zero
-        sizes = PanelCurve(np.abs(sines.values), sines.error, [])
-        least = replace(panels, curves={"": sizes}).find_peak("", -1)
+        least = panels.find_peak("sin_mu", lambda sines: -np.abs(sines))
         mu = math.asin(min(1.0, abs(least.value)))
         return Peak(0.0 if mu <= ZERO_TRANSMISSION_ANGLE else mu, least.place)
 
@@ -263,7 +263,7 @@ class Facts:
         motion = Motion(**sweep, branch=int(at.branch[first]))  # type: ignore[arg-type]
         whole = solve(replace(scene, motion=motion, tolerances=()), "position")
         panels = describe_motion(whole).positions
-        least, most = (panels.find_peak("stroke", sense).value for sense in (-1, 1))
+        least, most = (panels.find_peak("stroke", end).value for end in (LOWER, UPPER))
         # a cylinder whose ends meet has a corner there
         return 0.0 if least <= EXTREME_ERROR * most else least, most
 
