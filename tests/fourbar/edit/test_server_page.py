@@ -62,11 +62,6 @@ class Page:
     def is_quiet(self):
         assert not self.driver.get_log("browser")
 
-    def resize(self, width, height=900):
-        size = {"width": width, "height": height, "mobile": False}
-        override = "Emulation.setDeviceMetricsOverride"
-        self.driver.execute_cdp_cmd(override, size | {"deviceScaleFactor": 1})
-
     def run(self, script, *arguments):
         return self.driver.execute_script(script, *arguments)
 
@@ -125,23 +120,19 @@ class Page:
     def numbers(self, *names):
         return [float(self.text(name).replace("−", "-")) for name in names]
 
-    def click_at(self, x, y, *held):
-        """Click a pixel of the picture."""
+    def click_at(self, x, y):
+        """Click a pixel of the picture, off the grid."""
         picture = self.element("picture")
         off = x - picture.size["width"] / 2, y - picture.size["height"] / 2
-        chain = ActionChains(self.driver)
-        for key in held:
-            chain.key_down(key)
+        chain = ActionChains(self.driver).key_down(Keys.SHIFT)
         chain.move_to_element_with_offset(picture, *off).click()
-        for key in held:
-            chain.key_up(key)
-        chain.perform()
+        chain.key_up(Keys.SHIFT).perform()
 
     def click_pins(self, width, *pixels):
-        """Draw O2, A, B and O4 in an empty drawing of a width, off the grid."""
+        """Draw O2, A, B and O4 in an empty drawing of a width."""
         self.type("sketch-width", width)
-        for x, y in pixels:
-            self.click_at(x, y, Keys.SHIFT)
+        for pixel in pixels:
+            self.click_at(*pixel)
 
     def save(self):
         self.click("save")
@@ -170,7 +161,8 @@ def path(tmp_path):
 def page(chromium):
     """The one browser, whose console must be empty but where a line was cut."""
     page = Page(chromium)
-    page.resize(1280)
+    size = {"width": 1280, "height": 900, "mobile": False, "deviceScaleFactor": 1}
+    chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     yield page
     chromium.get("about:blank")
     page.end()

@@ -111,13 +111,6 @@ def test_the_door_is_held_by_what_its_energy_asks():
     assert s.torque[0] - fastened.torque[0] == approx(0.0265373, abs=6e-8)
 
 
-def test_a_door_without_other_forces_is_free_beyond_the_springs_length():
-    scene = make_door('theta_2 = ["40 deg", "120 deg"]\nomega_2 = "0 rad/s"')
-    alone = replace(scene, loads=(), effects=scene.effects[-1:])
-    torque = solve(alone).torque
-    assert torque[0] == 0.0 and torque[1] == approx(0.0506291, abs=6e-8)
-
-
 @pytest.mark.slow
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'

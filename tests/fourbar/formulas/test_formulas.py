@@ -2,7 +2,7 @@
 
 import os
 from fractions import Fraction
-from math import pi, sin, tau
+from math import pi, tau
 
 import mpmath as mp
 import numpy as np
@@ -212,24 +212,6 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
         assert np.array_equal(*kept)
         close = abs(decided[n] - half[n]).max()
         assert (close > 1e-6) == (offset is not None)
-
-
-@pytest.mark.parametrize(
-    "psi, lengths",
-    [
-        (3.141, (0.75, 0.75, 1.5, 1e-6)),
-        (1e-3, (0.75, 0.75 + 1.4e-3, 2e-6, 1.4e-3)),
-    ],
-)
-def test_the_factor_that_changes_less_gives_the_other_its_digits(psi, lengths):
-    """outer + inner = 4 b c, of which both are small parts of 4 a d on short bars."""
-    d, a, b, c = lengths
-    half = half_angle(loop(*lengths), psi)
-    with mp.workdps(50):
-        exact = five(uniform(*lengths), mp.mpf(psi))[3:]
-    changes = 4 * a * d * abs(sin(psi)) * psi  # with the last digit of psi
-    for ours, factor in zip((half.outer, half.inner), exact, strict=True):
-        assert abs(factor - float(ours)) <= PRODUCTS * (4 * b * c + changes)
 
 
 def test_the_power_of_two_above_a_number():

@@ -19,7 +19,7 @@ from fourbar import (
     instant_centres,
     point_coefficients,
 )
-from fourbar.formulas.mobility import circuits, find_intervals, turns_fully
+from fourbar.formulas.mobility import circuits, find_intervals
 from fourbar.formulas.path import compute_state
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows
@@ -139,15 +139,6 @@ def test_symmetric_circuits_draw_mirror_images():
     for n in (10, 200):
         apart = np.hypot(second.x - first.x[n], second.y + first.y[n])
         assert apart.min() < 1e-12
-
-
-def test_a_curve_with_one_change_point_takes_two_turns():
-    bars = bare(2.0, 1.0, 4.0, 3.0)
-    curve = coupler_curve(bars, 1.0, 1.0)
-    assert turns_fully(bars)
-    turned = curve.theta_2[-1] - curve.theta_2[0]
-    assert turned == approx(2.0 * math.tau, rel=4 * EPS)
-    assert set(curve.branch.tolist()) == {1, -1}
 
 
 def test_a_circuit_that_does_not_exist_is_refused():
