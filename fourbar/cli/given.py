@@ -20,7 +20,12 @@ from fourbar.show.lines import find_terminal_width
 from fourbar.show.shown_units import states_radians, units, units_of_scene
 from fourbar.solution import Conversion
 from fourbar.solving import find_last_stage, solve
-from fourbar.studies.passing import STATED_POSITIONS, find_positions, meet_limit
+from fourbar.studies.passing import (
+    STATED_POSITIONS,
+    extend_motion,
+    find_commanded,
+    meet_limit,
+)
 from fourbar.writing import require_file, write_text
 
 _FILE_TABLES = "fourbar.file_tables"
@@ -258,10 +263,13 @@ def read_positions(scene: Scene, text: str) -> Command:
         return locate(scene, name, value)
     require_unit("--at", text, value, "mm" if unit == "m" else "deg")
     stated = read_number("--at", value, unit)
-    if unit == "rad" and name != motion.commanded:
+    if name == motion.commanded:
+        return find_commanded(scene, stated)
+    if unit == "rad":
         rounding = half_unit_of_text(value, unit)
-        stated = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
-    return find_positions(scene, name, stated)
+        met = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
+        value = value if met == stated else f"{met!r} rad"
+    return locate(extend_motion(scene), name, value)
 
 
 def require_unit(key: str, text: str, value: str, likely: str) -> None:

@@ -60,7 +60,7 @@ from fourbar.show.shown_units import (
 )
 from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, Solution
-from fourbar.studies.passing import move_inside_limit
+from fourbar.studies.passing import is_at_limit
 
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
@@ -214,7 +214,7 @@ class SceneBlock(Facts):
         for bar, pair in BARS_IN_LINE.items():
             first, second = (one[f"theta_{word}"] for word in pair.split(" and "))
             theta = f"theta_{bar}"
-            _, is_limit = move_inside_limit(self.scene, bar, float(one[theta][0]))
+            is_limit = is_at_limit(self.scene.linkage, bar, float(one[theta][0]))
             # at a change point each bar moves on
             is_alone = bar != one.at.bar and one.status_code[0] == OK
             sine = math.sin((second - first)[0])

@@ -8,6 +8,7 @@ then passes it; one that changes its side by a jump does not have the value.
 import numpy as np
 
 from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_units
+from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import require
 from fourbar.quantities import Array
 from fourbar.quantities.units import NUMBER_TEXT
@@ -17,7 +18,12 @@ from fourbar.show.shown_units import drop_rounding
 from fourbar.solution import where_assembled
 from fourbar.solving import find_last_stage
 from fourbar.studies.course import MotionCourse
-from fourbar.studies.passing import SAME_POSITION, is_same_position
+from fourbar.studies.passing import (
+    COMMANDED_ANGLES,
+    SAME_POSITION,
+    STATED_POSITIONS,
+    is_same_position,
+)
 
 JUMP = 1e-3
 """Part of its change over an interval by which a column jumps at one place in it."""
@@ -71,7 +77,7 @@ class _LocatedSearch:
         self.scene = scene
         self.name = name
         stage = "error" if name.endswith("_error") else "force"
-        if find_last_stage(scene) == "position":
+        if find_last_stage(scene) == "position" or name in STATED_POSITIONS:
             stage = "position"
         self.course = MotionCourse(scene, stage)
         self.places = self.course.places
@@ -118,6 +124,15 @@ class _LocatedSearch:
         self.places[rows] = located.x[located.success]
         self.values[rows] += (sides * located.f_x)[located.success]
         self.is_extreme[rows] = True
+        if self.name in COMMANDED_ANGLES and self.commanded in COMMANDED_ANGLES:
+            self._meet_limits(int(self.name[-1]), int(self.commanded[-1]))
+
+    def _meet_limits(self, bar: int, commanded: int) -> None:
+        """Move extremes of a bar's angle to its limits, which have a closed form."""
+        for limit in limit_positions(self.scene.linkage, bar):
+            away = self._wrap(self.places - limit[commanded - 2])
+            near = self.is_extreme & (np.abs(away) <= SAME_POSITION)
+            self.places[near] -= away[near]
 
     def locate(self, text: str) -> Command:
         """Locate the positions that have a value, in the order of the motion."""
@@ -144,6 +159,8 @@ class _LocatedSearch:
         gaps = self._wrap(self.values - value)
         room = np.full(len(gaps), CONSTANT * max(self.usual, abs(value)))
         room[self.is_extreme] = TOUCHES * extent
+        if self.unit == "rad":
+            room[self.is_extreme] = max(TOUCHES * extent, SAME_POSITION)
         gaps[np.abs(gaps) <= room] = 0.0
         zeros = gaps == 0.0
         if (zeros[1:] & zeros[:-1]).any():
@@ -190,7 +207,7 @@ class _LocatedSearch:
 
     def _drop_repeated(self, places: Array) -> Array:
         """Drop the positions that are an earlier one after whole turns."""
-        if self.commanded not in ("theta_2", "theta_3", "theta_4"):
+        if self.commanded not in COMMANDED_ANGLES:
             return places
         pins = self.course.solve(places).B
         room = SAME_POSITION * max(self.scene.linkage.lengths)

@@ -12,6 +12,7 @@ import pytest
 from pytest import approx, raises
 
 from fourbar import (
+    Load,
     Motion,
     Scene,
     Sweep,
@@ -21,6 +22,7 @@ from fourbar import (
     solve,
     units,
 )
+from fourbar.effects import Table
 from fourbar.errors import (
     FourBarError,
     NotAssembledError,
@@ -28,9 +30,11 @@ from fourbar.errors import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
+from fourbar.show.located import locate
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
-    find_positions,
+    extend_motion,
+    find_commanded,
     meet_limit,
     say_nowhere,
     say_range,
@@ -49,6 +53,11 @@ AT_LIMIT = 10.0 * INSIDE_LIMIT
 """rad: the other bars turn by about as much as the bar from its limit, on average."""
 
 STROKES = load(MODELS / "capabilities/stroke_input.toml")
+
+
+def find_positions(scene, name, value):
+    unit = "m" if name == "stroke" else "rad"
+    return locate(extend_motion(scene), name, f"{value!r} {unit}")
 
 
 @pytest.mark.parametrize(
@@ -101,10 +110,14 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     assert told in read_block(there)
 
 
+def test_a_commanded_angle_out_of_range_is_refused_with_the_range():
+    with raises(FourBarError, match=r"theta_2 goes from 84\.6\d* to 365"):
+        find_commanded(thesis(), radians(30.0))
+
+
 REFUSED = [
-    (thesis(), "theta_2", radians(30.0), r"theta_2 goes from 84\.6\d* to 365"),
-    (crank_rocker(), "theta_4", 0.0, "no position of this assembly"),
-    (crank_rocker(), "stroke", 0.3, "is of a cylinder"),
+    (crank_rocker(), "theta_4", 0.0, "no position has it"),
+    (crank_rocker(), "stroke", 0.3, "unknown"),
 ]
 
 
@@ -123,14 +136,31 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     scene = Scene(linkage, Motion(Sweep(low + 0.1, high - 0.1, 20)))
     theta_4 = np.degrees(solve(scene).theta_4)
     opposite = radians(0.5 * (theta_4.min() + theta_4.max())) + pi
-    with raises(NotAssembledError, match="no position") as caught:
+    with state_messages_in(units("deg")), raises(NotAssembledError) as caught:
         find_positions(scene, "theta_4", opposite)
-    ends = re.findall(r"(-?[\d.]+) deg", str(caught.value))[-2:]
+    assert "no position has it" in str(caught.value)
+    ends = re.findall(r"(-?[\d.]+) (?:to|deg)", str(caught.value))[-2:]
     least, most = map(float, ends)
     ends = limit_positions(linkage)[:2]
     extent = sorted(-np.degrees(limit.theta_4) % 360.0 for limit in ends)
     assert least < theta_4.min() and theta_4.max() < most
     assert (least % 360.0, most % 360.0) == approx(extent, rel=2e-3)
+
+
+@pytest.mark.parametrize("turned", [0.0, 2.0 * pi, -4.0 * pi])
+@pytest.mark.parametrize("lengths", [(0.3, 0.2, 0.25, 0.1), (0.3, 0.1, 0.25, 0.22)])
+def test_positions_are_counted_as_the_motion_that_enters_its_range(lengths, turned):
+    """Of the second range of bar 2, or of a crank; a load is stated for a part."""
+    linkage = bare(*lengths)
+    low, high = np.array(find_intervals(linkage)[-1]) + turned
+    angles = Sweep(low - 0.1, low + 0.3, 8)
+    part = Table((low % (2.0 * pi), low % (2.0 * pi) + 0.3), (1.0, 1.0))
+    load = Load(4, moment=1.0, table=part)
+    scene = Scene(linkage, Motion(angles, 1.0), loads=(load,))
+    theta_4 = float(solve(scene, "position").theta_4[6])
+    found = find_positions(scene, "theta_4", theta_4)
+    assert low + 0.2 == approx(found.angle[0], abs=1e-9)
+    assert (found.angle < high).all()
 
 
 ROCKER_WITH_RAM = """\
