@@ -472,9 +472,10 @@ def require_units(units: object) -> Conversion:
     ):
         allowed = 'must be as fourbar.units makes them, like fourbar.units("mm N.mm")'
         raise InputError("units", units, allowed)
-    for _, factor in units.values():
-        require("units", factor, "1", POSITIVE)
-    return units
+    return {
+        si: (unit, require("units", factor, "1", POSITIVE))
+        for si, (unit, factor) in units.items()
+    }
 
 
 def find_unit_in(unit: str, units: Conversion) -> tuple[str, float]:

@@ -161,7 +161,7 @@ def draw_figure(
     `Scene.plot` describes the parameters.
     """
     kind = _choose_figure(scene, figure)
-    require_units(units)
+    units = require_units(units)
     if dimensions and figure not in WITH_DIMENSIONS:
         raise InputError(
             "dimensions",
