@@ -57,13 +57,13 @@ def internal_forces(question):
         stated = state_from_pins(scene)
         pieces = [free_piece(stated, motion, answer, bar, cut) for cut in cuts]
         forces = fourbar.internal_forces(scene, solution, bar, cuts)
-        for name, ours in (("N", forces.N), ("V", forces.V), ("M", forces.M)):
-            theirs = np.stack([getattr(piece, name) for piece in pieces], axis=1)
-            size = np.stack(
-                [piece.turning if name == "M" else piece.pushing for piece in pieces],
-                axis=1,
+        for name, terms in (("N", "pushing"), ("V", "pushing"), ("M", "turning")):
+            theirs, size = (
+                np.stack([getattr(piece, of) for piece in pieces], axis=1)
+                for of in (name, terms)
             )
-            error = divide(np.abs(ours - theirs), size).max(axis=1)
+            apart = np.abs(getattr(forces, name) - theirs)
+            error = divide(apart, size).max(axis=1)
             if name == "M":
                 beyond = np.abs(theirs).max(axis=1) - np.abs(forces.largest.moment)
                 error = np.maximum(error, divide(beyond, size.max(axis=1)))
@@ -163,8 +163,7 @@ def free_piece(scene, motion, answer, bar, cut):
     _push_drive(scene, motion, answer, piece)
     for load in scene.loads:
         if load.bar == bar:
-            arm = find_arm(load, motion)
-            piece.place = (np.conj(motion.unit[bar]) * arm).real
+            piece.place = (np.conj(motion.unit[bar]) * find_arm(load, motion)).real
             apply_load(load, motion, piece)
             piece.place = 0.0
     gravity = 0.0

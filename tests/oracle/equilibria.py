@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from flint import arb
 
 import fourbar
 from fourbar.formulas.mobility import change_points, find_intervals, turns_fully
@@ -34,9 +35,14 @@ from fourbar_validation.compare.tolerance import (
     K,
     divide,
 )
+from fourbar_validation.engines.balls import (
+    OF_PIECE,
+    STEP_BITS,
+    compute_outputs,
+    make_balls,
+)
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
-from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import NotAskedError
 from tests.oracle.bounds import REST
 from tests.oracle.variants import make_row
@@ -69,8 +75,6 @@ def equilibria(question):
     missed.
     """
     scene = _at_rest(question.scene)
-    if missing := find_missing("flint"):
-        raise NotAskedError(missing)
     theta_2 = _list_samples(question)
     answer = fourbar.equilibrium(question.scene)
     if answer.indifferent:
@@ -175,12 +179,7 @@ def _hold(scene, angle, branch):
 
     NaN where it is ill-conditioned or does not assemble.
     """
-    command = Command(
-        angle,
-        np.full(angle.shape, branch, dtype=np.int8),
-        np.zeros(angle.shape),
-        np.zeros(angle.shape),
-    )
+    command = Command(angle, np.full(angle.shape, branch, dtype=np.int8), 0.0, 0.0)
     with np.errstate(all="ignore"):
         answer = FreeBody().answer(scene, command)
         if answer.refusal is not None:
@@ -271,15 +270,6 @@ def _derive_torque(scene, bar, angle, branch):
     of the inputs decides the angles of the others. The bar's angle may be off by as
     much as makes theta_2 round otherwise: a place is stated by theta_2.
     """
-    from flint import arb
-
-    from fourbar_validation.engines.balls import (
-        OF_PIECE,
-        STEP_BITS,
-        compute_outputs,
-        make_balls,
-    )
-
     commanded_motion = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
     scene = replace(scene, motion=Motion(**commanded_motion), drive_bar=bar)
     x = make_balls(scene, angle)
@@ -360,10 +350,6 @@ def _sum_inertias(scene):
     linkage = scene.linkage
     bars = [linkage.bar(number) for number in MOVING_BARS]
     reach = max(linkage.lengths) + max(abs(find_centre(bar)[0]) for bar in bars)
-    wheels = (
-        getattr(effect, "inertia", 0.0)
-        for effect in scene.effects
-        if effect.key == "flywheel"
-    )
+    wheels = (effect.inertia for effect in scene.effects if effect.key == "flywheel")
     of_bars = sum(find_mass(bar) * reach**2 + find_inertia(bar) for bar in bars)
     return of_bars + sum(wheels)

@@ -15,14 +15,14 @@ import numpy as np
 from fourbar.effects import Friction, Gravity, Viscous
 from fourbar.errors import InputError, LimitError
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import ENDS, Bar, FourBar
 from fourbar.mjcf.assembly import write_sdf as sdf_text
 from fourbar.mjcf.assembly import write_usd as usd_text
 from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import REFUSES, Row, keep_worst
 from fourbar_validation.compare.tolerance import EPS, K
-from tests.oracle.variants import ask_free_bodies, hold_to, take_few
+from tests.oracle.variants import ask_free_bodies, at_places, hold_to, take_few
 
 NUMBER_IN_A_FILE = r"[-+.\deE]+"
 
@@ -71,8 +71,7 @@ def _judge_file(question, engine, read):
     # a drive at a named point keeps its place without the point
     few = state_from_pins(take_few(question))
     scene = replace(few, loads=(), points=())
-    first = scene.motion.theta_2[:1]
-    opened = replace(scene, motion=scene.motion.replace(angle=first))
+    opened = at_places(scene, scene.motion.theta_2[:1])
     try:
         held = read(opened)
     except (LimitError, InputError) as limit:
@@ -83,12 +82,7 @@ def _judge_file(question, engine, read):
     rows = []
     with np.errstate(all="ignore"):
         for turns in held.turns:
-            answer = ask_free_bodies(
-                replace(
-                    theirs,
-                    motion=scene.motion.replace(angle=np.array([turns["input"]])),
-                )
-            )
+            answer = ask_free_bodies(at_places(theirs, np.array([turns["input"]])))
             answer.quantities |= {
                 f"theta_{MOVING_BAR_NUMBERS[bar]}": np.array([turns[bar]])
                 for bar in ("coupler", "output")
@@ -102,40 +96,25 @@ def _judge_file(question, engine, read):
 
 def _build_scene(held, scene):
     """Build the scene that a file describes, with motion and drive of another scene."""
-    bodies = held.bodies
-    pins = held.pins
-    span = pins["O4"] - pins["O2"]
-    ends = {
-        "input": pins["A"] - pins["O2"],
-        "coupler": pins["B"] - pins["A"],
-        "output": pins["B"] - pins["O4"],
-    }
-    two, three, four = (
-        Bar(
-            abs(end),
-            bodies[name].mass,
-            bodies[name].inertia,
-            cmath.polar(bodies[name].centre),
-        )
-        for name, end in ends.items()
-    )
+    span, *bars = (held.pins[end] - held.pins[start] for start, end in ENDS.values())
+    moving = []
+    for name, bar in zip(MOVING_BAR_NUMBERS, bars, strict=True):
+        _, _, mass, inertia, centre = held.bodies[name]
+        moving.append(Bar(abs(bar), mass, inertia, cmath.polar(centre)))
     effects = (Gravity(*cmath.polar(held.gravity)),)
     if held.damping:
         effects += (Viscous.at(**held.damping),)
     if held.friction:
         effects += (Friction.at(**held.friction),)
-    return replace(
-        scene,
-        linkage=FourBar(abs(span), two, three, four, cmath.phase(span)),
-        effects=effects,
-    )
+    linkage = FourBar(abs(span), *moving, cmath.phase(span))
+    return replace(scene, linkage=linkage, effects=effects)
 
 
 def _read_sdf(text):
     root = ET.fromstring(text)
 
-    def numbers(element, path):
-        return [float(number) for number in element.findtext(path, "nan").split()]
+    def numbers(element, path, left_out="nan"):
+        return [float(number) for number in element.findtext(path, left_out).split()]
 
     bodies = {}
     for link in root.iter("link"):
@@ -151,14 +130,11 @@ def _read_sdf(text):
     for joint in root.iter("joint"):
         pin = joint.get("name", "")
         child = bodies[joint.findtext("child", "")]
-        if joint.find("pose") is not None:
-            pose = complex(*numbers(joint, "pose")[:2])
-        else:
-            pose = 0j
+        pose = complex(*numbers(joint, "pose", "0 0")[:2])
         pins[pin] = child.place + pose * cmath.rect(1.0, child.turn)
         for name, at_pins in dynamics.items():
-            if joint.find(f"axis/dynamics/{name}") is not None:
-                at_pins[pin] = numbers(joint, f"axis/dynamics/{name}")[0]
+            if (stated := joint.findtext(f"axis/dynamics/{name}")) is not None:
+                at_pins[pin] = float(stated)
     gravity = complex(*numbers(next(root.iter("world")), "gravity")[:2])
     return Contents(
         bodies, pins, [_read_turns(bodies), _read_noted(text)], gravity, **dynamics
@@ -186,7 +162,7 @@ def _read_usd(text):
     for bar in MOVING_BAR_NUMBERS:
         block = blocks[bar]
         place, centre = (
-            complex(*numbers(block, f"{key}")[:2])
+            complex(*numbers(block, key)[:2])
             for key in ("xformOp:translate", "physics:centerOfMass")
         )
         mass = numbers(block, "physics:mass")[0]

@@ -275,7 +275,7 @@ def _require_beside(scene):
     ]
     for reaches in product((1.0, -1.0), repeat=len(of_lengths)):
         changes = {
-            tolerance.key: reach * tolerance.width * (3.0 if tolerance.sigma else 1.0)
+            tolerance.key: reach * tolerance.width * (1.0 + 2.0 * tolerance.sigma)
             for tolerance, reach in zip(of_lengths, reaches, strict=True)
         }
         if not stays_beside(file.move(changes), scene):
@@ -318,18 +318,17 @@ def _compute_expected(scene):
     slopes = []
     nodes = []
     for tolerance in scene.tolerances:
+        key = tolerance.key
         x, w = _NODES[tolerance.sigma]
         x *= tolerance.width
-        key = tolerance.key
         nodes.append([(key, 0.0, 1.0 - 2.0 * w), (key, x, w), (key, -x, w)])
+        _, step = numbers[key]
+        h = FIRST_ORDER_STEP * max(abs(step), tolerance.width)
+        up, down = (changed({key: change}) for change in (h, -h))
+        slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     for node in product(*nodes):
         off.append(changed({key: x for key, x, _ in node}))
         weights.append(math.prod(w for *_, w in node))
-    for tolerance in scene.tolerances:
-        _, step = numbers[tolerance.key]
-        h = FIRST_ORDER_STEP * max(abs(step), tolerance.width)
-        up, down = (changed({tolerance.key: change}) for change in (h, -h))
-        slopes.append({part: (up[part] - down[part]) / (2.0 * h) for part in nominal})
     w = np.array(weights)[:, None]
     widths = np.array([[tolerance.width] for tolerance in scene.tolerances])
     normal = np.array([[tolerance.sigma] for tolerance in scene.tolerances])
@@ -344,7 +343,7 @@ def _compute_expected(scene):
         first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
         bent = divide(np.abs(deviation - first_order), deviation)
         bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
-        worst = np.abs(slope * widths * np.where(normal, 3.0, 1.0)).sum(axis=0)
+        worst = np.abs(slope * widths * (1.0 + 2.0 * normal)).sum(axis=0)
         expected[part] = Expected(deviation, first_order, worst, bent)
     return expected
 

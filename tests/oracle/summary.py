@@ -68,7 +68,6 @@ _REPEATS = 1e-9
 """Greatest difference, rad, of angles of which one repeats the other, and of rates in
 parts of the largest.
 """
-ROW_TOLERANCES = {"bending": LOCATED_ROUGHLY}
 
 
 @dataclass
@@ -234,7 +233,7 @@ def summary(question):
     _judge_growth(judged)
     for name, errors in judged.errors.items():
         error = np.array(errors)
-        tolerance = ROW_TOLERANCES.get(name, PRINTED)
+        tolerance = LOCATED_ROUGHLY if name == "bending" else PRINTED
         nowhere = np.full(len(errors), math.nan)
         reason = f"{len(errors)} numbers, {PEAK_INTERVALS + 1} positions"
         yield make_row(question, "summary", name, error, tolerance, nowhere, reason)
@@ -261,8 +260,7 @@ def _summarize_scene(question):
 def _judge_ranges(judged):
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
     for bar in MOVING_BARS:
-        ends = judged.facts.angles[bar]
-        low, high = ends
+        low, high = judged.facts.angles[bar]
         there = judged.ask([low.place, high.place]).quantities[f"theta_{bar}"]
         fine = np.unwrap(judged.fine.quantities[f"theta_{bar}"])
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
@@ -311,12 +309,6 @@ def _judge_drive(judged):
         if name not in judged.growing and most != 0.0:
             beyond = entry[f"peak_{name}"] / most - 1.0
             judged.add_excess("peaks", -beyond, beyond - EXCESS_BETWEEN_POSITIONS)
-
-
-def _find_turned(judged):
-    """Find the angle that the commanded bar turns, with its sense, rad."""
-    at = judged.solution.at
-    return np.sign(np.mean(at.speed)) * abs(at.angle[-1] - at.angle[0])
 
 
 class _Panels(NamedTuple):
@@ -402,7 +394,8 @@ def _judge_integrals(judged):
     judged.add("integrals", divide(swing, most))
     at = judged.solution.at
     if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
-        of_mean = given - entry["mean_torque"] * _find_turned(judged)
+        turned = np.sign(np.mean(at.speed)) * abs(at.angle[-1] - at.angle[0])
+        of_mean = given - entry["mean_torque"] * turned
         judged.add("integrals", divide(abs(of_mean), most))
 
 
@@ -415,8 +408,7 @@ def _judge_pins(judged):
         peak = facts.motion.find_peak(name)
         there = judged.ask(peak.place)
         at_peak = magnitude(there.quantities[name])
-        fine = magnitude(judged.fine.quantities[name])
-        judged.add_peak("pins", peak, at_peak, fine)
+        judged.add_peak("pins", peak, at_peak, magnitude(judged.fine.quantities[name]))
         of_pin = judged.motor["pins"][pin]
         judged.add_value("pins", of_pin["peak"], peak.value)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
@@ -450,20 +442,12 @@ def _judge_bending(judged):
         most = np.max([np.abs(piece.M).max() for piece in others])
         size = abs(largest.peak.value)
         if size == 0.0:  # a bar that is said not to bend, as one between two forces
-            judged.add("bending", _exceed_rounding(others))
+            vanish = [np.abs(piece.M) <= CUT.factor * piece.turning for piece in others]
+            judged.add("bending", 0.0 if np.all(vanish) else math.inf)
             continue
         moment = np.max([np.abs(piece.M[0]) for piece in at_peak])
         judged.add("bending", abs(moment - size) / size)
         judged.add_excess("bending", (most - size) / size)
-
-
-def _exceed_rounding(pieces):
-    """Return zero if no moment of some pieces exceeds the rounding of its terms.
-
-    Otherwise return infinity.
-    """
-    vanish = [np.abs(piece.M) <= CUT.factor * piece.turning for piece in pieces]
-    return 0.0 if np.all(vanish) else math.inf
 
 
 def _judge_growth(judged):
@@ -478,6 +462,5 @@ def _judge_growth(judged):
     conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
-    least = conditions.min() - np.abs(np.diff(conditions)).max()
-    if least > _LEAST_CONDITION:
+    if conditions.min() - np.abs(np.diff(conditions)).max() > _LEAST_CONDITION:
         judged.add("peaks", math.inf)

@@ -40,8 +40,7 @@ def commanding(motion):
 
 
 def weigh_limited(angle):
-    scene = FAULT_SCENES["limited"]
-    return replace(scene, loads=(), effects=(Gravity(9.81, angle),))
+    return replace(FAULT_SCENES["limited"], loads=(), effects=(Gravity(9.81, angle),))
 
 
 LIFT = """\

@@ -128,6 +128,7 @@ class SceneFile:
             pins = {pin: complex(*getattr(scene.drawing, pin)) for pin in PIN_FORCE}
             self._feet = {bar: pins[ends[0]] for bar, ends in ENDS.items()}
             self._bars = {bar: pins[j] - pins[i] for bar, (i, j) in ENDS.items()}
+            self._along = {bar: x / abs(x) for bar, x in self._bars.items()}
 
     def find_stated(self, keys):
         """Find those of the keys whose numbers the file states, and what they may be
@@ -153,8 +154,8 @@ class SceneFile:
         drawn = is_coordinate(key)
         if ".drawn." in key:
             (holder, last), bar, axis = self._find_place(self._by_pins, key)
-            along = self._bars[bar] / abs(self._bars[bar])
-            place = self._feet[bar] + cmath.rect(*map(_read, holder[last])) * along
+            turned = cmath.rect(*map(_read, holder[last])) * self._along[bar]
+            place = self._feet[bar] + turned
             return (place.real, place.imag)[axis], min(map(abs, self._bars.values()))
         table, last = find_entry(self._by_pins if drawn else self._by_lengths, key)
         entry = table[last]
@@ -190,8 +191,7 @@ class SceneFile:
             if ".drawn." in key:  # moved where the bars are drawn
                 (table, last), bar, axis = self._find_place(document, key)
                 place = cmath.rect(*map(_read, table[last]))
-                along = self._bars[bar] / abs(self._bars[bar])
-                place += change * _ALONG_AXES[axis] * along.conjugate()
+                place += change * _ALONG_AXES[axis] / self._along[bar]
                 table[last] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
                 continue
             table, last = find_entry(document, key)
@@ -220,8 +220,8 @@ class SceneFile:
         if document.get("bar") == 1 and "from_pin" in document:
             O2, O4 = (complex(*map(_read, pins[pin])) for pin in ENDS[1])
             place = cmath.rect(*map(_read, document["from_pin"]))
-            place *= self._bars[1] / abs(self._bars[1])
-            place = (place + self._feet[1] - O2) * abs(O4 - O2) / (O4 - O2)
+            place = place * self._along[1] + self._feet[1] - O2
+            place *= abs(O4 - O2) / (O4 - O2)
             document["from_pin"] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
 
 
@@ -264,8 +264,7 @@ def _measure_misses(linkage, bar):
     r = lengths.pop(bar - 2)
     m, n = lengths
     misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
-    missed = np.abs(misses) / sum_lengths(linkage) ** 2
-    return missed
+    return np.abs(misses) / sum_lengths(linkage) ** 2
 
 
 def stays_beside(member, scene):
