@@ -62,8 +62,7 @@ def test_a_world_that_is_not_finite_fails():
 
 
 def test_the_page_states_errors_that_hold():
-    table = read_table(read("docs/cost.md"), "worlds")
-    rows = {name: cells for name, *cells in table}
+    rows = {name: cells for name, *cells in read_table(read("docs/cost.md"), "worlds")}
     assert list(rows) == [FORMULAS_ON_ONE_CORE, *CONTENDERS]
     for name in CONTENDERS:
         check_errors(name, *map(float, rows[name][-3:-1]))

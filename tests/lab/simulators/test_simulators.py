@@ -136,8 +136,7 @@ def test_each_solver_of_pinocchio_carries_the_loop(setting):
     errors = find_errors(solvers, name=setting, steps_per_turn=314)
     assert max(errors.values()) < IN_PINOCCHIO[accurate]
     if accurate:
-        at_states = find_errors(solvers, name=setting)
-        assert max(at_states.values()) < IN_PINOCCHIO[True]
+        assert max(find_errors(solvers, name=setting).values()) < IN_PINOCCHIO[True]
     else:
         answer = solvers().at_setting(name=setting).answer(*ask_position())
         assert answer.refusal == "an impulse solver has no single states"
