@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -21,6 +22,14 @@ def read_table(page, name):
     table = page.partition(f"<!-- data {name} -->")[2].partition("<!-- end -->")[0]
     lines = table.strip().splitlines()[2:]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def wait_until(ready, seconds):
+    """Wait until something is so, and fail if it takes longer."""
+    latest = time.monotonic() + seconds
+    while not ready():
+        assert time.monotonic() < latest
+        time.sleep(0.01)
 
 
 def run_python(*words, folder=ROOT, **variables):

@@ -57,8 +57,7 @@ def find_angle(side, first, second):
 
 def bare(d, a, b, c, theta_1=0.0):
     """Make a linkage of bars without mass."""
-    moving = (Bar(length) for length in (a, b, c))
-    return FourBar(d, *moving, ground_angle=theta_1)
+    return FourBar(d, *(Bar(length) for length in (a, b, c)), ground_angle=theta_1)
 
 
 def draw_linkage(rng, integers=False):
@@ -66,8 +65,7 @@ def draw_linkage(rng, integers=False):
     while True:
         lengths = rng.integers(1, 7, 4) if integers else rng.uniform(0.1, 1.0, 4)
         if 2.0 * lengths.max() < lengths.sum() - (0.0 if integers else 0.01):
-            theta_1 = rng.uniform(-math.pi, math.pi)
-            return bare(*map(float, lengths), float(theta_1))
+            return bare(*map(float, lengths), float(rng.uniform(-math.pi, math.pi)))
 
 
 def balance(left, omega_2=0.01):

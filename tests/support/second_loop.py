@@ -145,8 +145,7 @@ class Loop:
         force_34 = complex(*self.data.efc_force[:2])
         force_14 = needed[2] - force_34
         force_23 = needed[1] + force_34
-        force_12 = needed[0] + force_23
-        forces = (force_12, -force_23, -force_34, force_14)
+        forces = (needed[0] + force_23, -force_23, -force_34, force_14)
         pairs = [[force.real, force.imag] for force in forces]
         return dict(zip(PIN_FORCES, pairs, strict=True))
 

@@ -101,8 +101,7 @@ class Bodies:
         B = A + b * np.exp(1j * theta_3)
         self.theta_2 = theta_2
         self.theta = np.array([theta_2, theta_3, np.angle(B - self.ground)])
-        first = np.array([0j, A, self.ground])
-        self.z = first + self.centre * np.exp(1j * self.theta)
+        self.z = np.array([0j, A, self.ground]) + self.centre * np.exp(1j * self.theta)
         gap = self._gap()
         for _ in range(self.newton_steps):
             x, y, turn = np.split(np.linalg.solve(self.jacobian(), -gap), 3)

@@ -10,13 +10,14 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fourbar.errors import INTERRUPTED
-from tests.support.checkout import BUSY, ROOT, run_python
+from tests.support.checkout import BUSY, ROOT, run_python, wait_until
 from tests.support.guests import list_processes
 
 PATIENCE = 8.0 * BUSY
@@ -69,16 +70,12 @@ def start(what, folder, mark):
     )
 
 
-def wait_for_process(word, mark):
-    """Wait until a process runs that has the word in its command line."""
-    for _ in range(3000):
-        for process in list_processes(mark):
-            line = Path(f"/proc/{process}/cmdline").read_bytes()
-            # the harness's own line names the guest too
-            if word in line and b"validation" not in line:
-                return
-        time.sleep(0.01)
-    raise AssertionError("nothing was started")
+def has_process(word, mark):
+    """Tell whether a process runs that has the word in its command line."""
+    processes = list_processes(mark)
+    lines = [Path(f"/proc/{process}/cmdline").read_bytes() for process in processes]
+    # the harness's own line names the guest too
+    return any(word in line and b"validation" not in line for line in lines)
 
 
 @contextmanager
@@ -86,10 +83,7 @@ def leaving_nothing(mark):
     """Hold that soon after the body no process has the mark."""
     try:
         yield
-        until = time.monotonic() + PATIENCE
-        while list_processes(mark) and time.monotonic() < until:
-            time.sleep(0.1)
-        assert not list_processes(mark)
+        wait_until(lambda: not list_processes(mark), PATIENCE)
     finally:
         for left in list_processes(mark):
             os.kill(left, signal.SIGKILL)
@@ -112,7 +106,7 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
         process = start(what, tmp_path, mark)
         with leaving_nothing(mark):
             started = STARTING if by_terminal or what == READING else b"busy.py"
-            wait_for_process(started, mark)
+            wait_until(partial(has_process, started, mark), 30.0)
             time.sleep(moment)
             (os.killpg if by_terminal else os.kill)(process.pid, ended_by)
             _, errors = process.communicate(timeout=PATIENCE)

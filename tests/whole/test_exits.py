@@ -158,18 +158,8 @@ def test_a_program_without_output_streams_runs(monkeypatch):
     sys.stderr.close()
 
 
-def study(folder):
-    """Files that the commands of the table are given."""
-    write_results([ROW], folder / "good.csv")
-    write_results([changed(error=1.0, verdict=FAILS)], folder / "bad.csv")
-    # a torque that is not that of the crank-rocker
-    (folder / "theirs.csv").write_text("theta_2 [deg], torque\n60, 1.0\n")
-    (folder / "scene.toml").write_text(fourbar.dump(crank_rocker()))
-
-
 FOURBAR, LAB = fourbar.cli.status, fourbar_lab.cli.status
 VALIDATION = fourbar_validation.cli.status
-FIGURES = "fourbar_validation.published.comparison.list_figures"
 
 
 @pytest.mark.parametrize(
@@ -185,7 +175,8 @@ FIGURES = "fourbar_validation.published.comparison.list_figures"
 def test_a_figure_that_no_erratum_explains_and_none_are_status_1(
     figures, words, monkeypatch, capsys
 ):
-    monkeypatch.setattr(FIGURES, lambda: iter(figures))
+    listing = "fourbar_validation.published.comparison.list_figures"
+    monkeypatch.setattr(listing, lambda: figures)
     assert VALIDATION(["published"]) == FAILED
     assert words in capsys.readouterr().out
 
@@ -194,10 +185,8 @@ STABILITY = ["stability", "--samples", "3", "--family", "random", "--jobs", "1"]
 
 
 def test_a_torque_off_in_its_twelfth_digit_is_status_1(monkeypatch):
-    true = fourbar.solve
-
     def off(*arguments, **options):
-        solution = true(*arguments, **options)
+        solution = fourbar.solve(*arguments, **options)
         return replace(solution, torque=solution.torque * (1.0 + 1e-12))
 
     judge_here(monkeypatch)
@@ -244,7 +233,11 @@ PROCESSES = [
     ids=[f"{program} {Path(line).name}" for program, line, _ in PROCESSES],
 )
 def test_each_command_in_a_process_of_its_own(program, line, status, tmp_path):
-    study(tmp_path)
+    write_results([ROW], tmp_path / "good.csv")
+    write_results([changed(error=1.0, verdict=FAILS)], tmp_path / "bad.csv")
+    # a torque that is not that of the crank-rocker
+    (tmp_path / "theirs.csv").write_text("theta_2 [deg], torque\n60, 1.0\n")
+    fourbar.save(crank_rocker(), tmp_path / "scene.toml")
     ended, complained = alone(program, line.split(), tmp_path)
     assert ended == status, complained
     assert bool(complained.strip()) == (status == BAD_INPUT), complained

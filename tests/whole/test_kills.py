@@ -41,7 +41,7 @@ from fourbar_validation.scenes.suites import (
     Random,
     read_scene_files,
 )
-from tests.support.checkout import BUSY, ROOT
+from tests.support.checkout import BUSY, ROOT, wait_until
 from tests.support.guests import end_guests, list_processes, write_program
 from tests.support.here import Heard, judge_here
 from tests.support.texts import LENGTHS
@@ -72,8 +72,7 @@ EXACT = choose_engines("free-body")
 
 def judge_all(suite, out, engines=EXACT, workers=2):
     heard = Heard()
-    options = dict(workers=workers, drawn=False)
-    summary = run(Plan(suite, engines, **options), out, heard)
+    summary = run(Plan(suite, engines, workers=workers, drawn=False), out, heard)
     assert heard.scenes[COLLECTING] == len(suite)
     return summary
 
@@ -121,8 +120,7 @@ def test_a_worker_killed_once_is_not_held_against_the_engine(
     unlucky = Engine("unlucky", Unlucky, EQUIVALENCE)
     judge_all(Few(("a",)), tmp_path / "run", (*EXACT, unlucky), workers=1)
     rows = list(read_columns(tmp_path / "run" / "results.csv"))
-    failing = [row.engine for row in rows if row.verdict == FAILS]
-    assert failing == ["unlucky"] * blamed
+    assert [row.engine for row in rows if row.verdict == FAILS] == ["unlucky"] * blamed
     assert {"formulas", "free-body", "unlucky"} <= {row.engine for row in rows}
     assert not any(lives.iterdir())
 
@@ -250,10 +248,9 @@ class Disturbed:
             stderr=stderr,
             start_new_session=True,
         )
-        deadline = time.monotonic() + 60.0
-        while len(self.parts) < wanted and process.poll() is None:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        wait_until(
+            lambda: len(self.parts) >= wanted or process.poll() is not None, 60.0
+        )
         return process
 
     def kill(self, victim, process):
@@ -326,10 +323,7 @@ def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
     tables = ("results.csv", "results.parquet")
     assert filecmp.cmpfiles(out, expected, tables, shallow=False)[0] == [*tables]
     assert sorted(os.listdir(out)) == sorted(os.listdir(expected))
-    latest = time.monotonic() + 30.0
-    while VICTIMS[1:] and list_processes(mark):
-        assert time.monotonic() < latest
-        time.sleep(0.1)
+    wait_until(lambda: not (VICTIMS[1:] and list_processes(mark)), 30.0)
 
 
 @pytest.mark.parametrize(

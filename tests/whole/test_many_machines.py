@@ -11,7 +11,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,7 +18,7 @@ import pytest
 
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status
-from tests.support.checkout import ROOT, read
+from tests.support.checkout import ROOT, read, wait_until
 from tests.support.here import judge_here
 
 SCENES = 41
@@ -69,12 +68,11 @@ def collect_as_shown(folder):
 
 def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     """One task is killed in the middle, and submitted again."""
-    script = read("docs/ci/slurm.sh")
 
     def submit(task, tasks, **variables):
         of_slurm = {"SLURM_ARRAY_TASK_ID": task, "SLURM_ARRAY_TASK_COUNT": tasks}
         variables |= of_slurm | {"SLURM_CPUS_PER_TASK": "1"}
-        run_shell(script, tmp_path, OPTIONS, **variables)
+        run_shell(read("docs/ci/slurm.sh"), tmp_path, OPTIONS, **variables)
 
     submit("1", "2")
     submit("2", "2")
@@ -101,10 +99,7 @@ def started(*line, folder):
 
 def wait_for(ready, process):
     """Wait for what a process makes while it runs; it must not have ended then."""
-    latest = time.monotonic() + TIME
-    while process.poll() is None and not ready():
-        assert time.monotonic() < latest, "it takes too long"
-        time.sleep(0.02)
+    wait_until(lambda: process.poll() is not None or ready(), TIME)
     assert process.poll() is None, "it has ended"
 
 

@@ -132,8 +132,7 @@ def test_every_module_has_a_test_or_is_listed(top):
         for path in paths
         if not own_test(path, top)
     }
-    of_top = {name for name in listed() if name.partition("/")[0] == top}
-    assert without == of_top
+    assert without == {name for name in listed() if name.partition("/")[0] == top}
 
 
 def test_the_tests_of_the_table_are_there():

@@ -36,8 +36,7 @@ def folder(tmp_path):
     scene_folder = tmp_path / "Análisis de θ"
     scene_folder.mkdir()
     model = fourbar.load(ROOT / "models" / "crank_rocker.toml")
-    lighter = replace(model.linkage.output, mass=0.36)
-    linkage = replace(model.linkage, output=lighter)
+    linkage = replace(model.linkage, output=replace(model.linkage.output, mass=0.36))
     scene = replace(model, linkage=linkage, title="Mécanique, θ₂", source="")
     save(scene, scene_folder / "scène.toml")
     return scene_folder

@@ -71,20 +71,13 @@ def list_patterns():
     """List the literal patterns of the three packages, each with its place."""
     for folder in FOLDERS:
         for path in sorted((ROOT / folder).rglob("*.py")):
-            for call in ast.walk(ast.parse(read(path))):
-                if not isinstance(call, ast.Call) or not call.args:
-                    continue
-                called = call.func
-                if (
-                    not isinstance(called, ast.Attribute)
-                    or called.attr not in FUNCTIONS
-                ):
-                    continue
-                pattern = call.args[0]
-                of_re = isinstance(called.value, ast.Name) and called.value.id == "re"
-                if of_re and isinstance(pattern, ast.Constant):
-                    place = f"{path.relative_to(ROOT)}:{call.lineno}"
-                    yield place, re.compile(str(pattern.value))
+            for node in ast.walk(ast.parse(read(path))):
+                match node:
+                    case ast.Call(
+                        ast.Attribute(ast.Name("re"), name), [ast.Constant(pattern), *_]
+                    ) if name in FUNCTIONS:
+                        place = f"{path.relative_to(ROOT)}:{node.lineno}"
+                        yield place, re.compile(str(pattern))
 
 
 def measure_slowest(pattern):

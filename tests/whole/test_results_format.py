@@ -43,9 +43,9 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
-        options = dict(workers=1, drawn=False)
         suite = Random(8, 1, tuple(DrawnType))
-        run(Plan(suite, choose_engines("free-body"), **options), folder / "results")
+        plan = Plan(suite, choose_engines("free-body"), workers=1, drawn=False)
+        run(plan, folder / "results")
     return folder
 
 
@@ -67,12 +67,9 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit():
         for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) ([^`;]+)", groups)
         for name in re.findall(r"`(\w+)`", names)
     }
-    units = {
-        q.name: f"{q.unit}, vector" if q.kind == "vector" else q.unit
-        for q in QUANTITIES
-    }
     assert described == {
-        (q.stage or "commanded", q.name, units[q.name]) for q in QUANTITIES
+        (q.stage or "commanded", q.name, q.unit + ", vector" * (q.kind == "vector"))
+        for q in QUANTITIES
     }
 
 
@@ -97,8 +94,7 @@ def test_every_quantity_of_a_scene_is_described(results):
         )
         for row in read_columns(file)
     ]
-    whole_range = crank_rocker(motion=Motion(None, 10.0))
-    rows += judge("whole range", whole_range, []).rows
+    rows += judge("whole range", crank_rocker(motion=Motion(None, 10.0)), []).rows
     identities = {row.quantity for row in rows if row.engine == FORMULAS}
     of_engines = {*WHOLE_ENGINE, *RELEASED_ERRORS, SHIPPED, *OF_A_SCENE}
     assert set(described) == (identities | of_engines) - of_positions
@@ -127,9 +123,15 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results):
     assert kept == table
 
 
-def test_the_pandas_snippet_runs(results, monkeypatch, capsys):
+@pytest.fixture
+def beside_accepted(results, monkeypatch):
+    """Where the page's programs stand: the run beside it is accepted."""
     monkeypatch.chdir(results)
     assert status(["accept", "results"]) == 0
+
+
+@pytest.mark.usefixtures("beside_accepted")
+def test_the_pandas_snippet_runs(capsys):
     rows, accepted = re.findall("```python\n(.*?)```", PAGE, re.DOTALL)
     exec(rows, {})
     printed = capsys.readouterr().out
@@ -140,10 +142,9 @@ def test_the_pandas_snippet_runs(results, monkeypatch, capsys):
     assert not len(names["failing"]) and len(names["times"])
 
 
-def test_the_sql_runs(results, monkeypatch):
+@pytest.mark.usefixtures("beside_accepted")
+def test_the_sql_runs():
     duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
-    monkeypatch.chdir(results)
-    assert status(["accept", "results"]) == 0
     rows, accepted = re.findall("```sql\n(.*?)```", PAGE, re.DOTALL)
     assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(rows).fetchall()}
     assert (
