@@ -71,13 +71,8 @@ SCENE = fourbar.load(MODEL)
 def saved(tmp_path):
     """Writes a run with these rows into a folder of this name."""
 
-    def save(name, *rows, times="", about=HERE):
-        return save_run(
-            tmp_path / name,
-            [*rows],
-            times,
-            about,
-        )
+    def save(name, *rows, **more):
+        return save_run(tmp_path / name, [*rows], **more)
 
     return save
 
@@ -112,13 +107,7 @@ def accepts(tmp_path, call):
     """Accepts a run into the folder `kept` by the command, and returns its status."""
 
     def run(folder, *options):
-        return call(
-            "accept",
-            folder,
-            "--to",
-            tmp_path / "kept",
-            *options,
-        )[0]
+        return call("accept", folder, "--to", tmp_path / "kept", *options)[0]
 
     return run
 
@@ -233,12 +222,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
     ):
         file.write_bytes(damaged)
         before = read_files(kept)
-        code, _, line = call(
-            "accept",
-            run,
-            "--to",
-            kept,
-        )
+        code, _, line = call("accept", run, "--to", kept)
         words = f"--to = '{file}': is damaged, or no table written by `accept`"
         assert (code, line) == (BAD_INPUT, f"error: {words}\n"), damaged[:20]
         assert read_files(kept) == before
@@ -297,12 +281,7 @@ a.toml --random 3 | leave out the scene files
 def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
     options, words, tmp_path, call
 ):
-    code, _, message = call(
-        "run",
-        *options.split(),
-        "--out",
-        tmp_path / "out",
-    )
+    code, _, message = call("run", *options.split(), "--out", tmp_path / "out")
     assert code == BAD_INPUT and message.startswith("error: ") and words in message
     assert message.count("\n") == 1 and not (tmp_path / "out").exists()
 
@@ -336,12 +315,7 @@ def test_what_is_compared_can_be_chosen(saved, call, compare):
     assert code == HOLDS and lines[0] == "Not run: scene scene 000 (1 row)"
     assert lines[50] == "Not run: 28 more (28 rows)"
     assert " in 2 of 80 rows: 78 not run, 2 same" in lines[-1]
-    code, (*_, verdict) = compare(
-        whole,
-        some,
-        "--only",
-        "scene 007, scene 070",
-    )
+    code, (*_, verdict) = compare(whole, some, "--only", "scene 007, scene 070")
     assert code == HOLDS and " in 2 rows: 2 same" in verdict
     assert verdict.startswith(f"No regression against {whole} of {HERE.date[:10]}")
     worse = saved("worse", rows[7], replace(rows[70], quantity="F12", error=1e-9))
@@ -373,12 +347,7 @@ def disagreeing(worse):
     new = []
     for row in old:
         reason = f"{ord(row.scene)}e-6 where 1e-9 was predicted"
-        failed = replace(
-            row,
-            verdict=FAILS,
-            error=1e-6,
-            reason=reason,
-        )
+        failed = replace(row, verdict=FAILS, error=1e-6, reason=reason)
         new.append(failed if f"{row.engine} {row.quantity}" in worse else row)
     return old, new
 
@@ -429,12 +398,13 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     assert groups[0].partition(": ")[2] in page
 
 
+EXACT = Engine("engine", FreeBody, EQUIVALENCE)
+
+
 def made(rows, scenes):
     """Return a run of these rows, whose record states these scenes."""
     stated = {name: describe_changes(scene) for name, scene in scenes.items()}
-    return describe_run(
-        [Engine("engine", FreeBody, EQUIVALENCE)], "suite", stated
-    ), rows
+    return describe_run([EXACT], "suite", stated), rows
 
 
 def weighted(inertia, **changes):
@@ -499,14 +469,7 @@ def test_a_renamed_scene_is_found_by_what_it_states(saved, compare):
         rows = [changed(scene=name, error=error, allowed=1e-9) for name in scenes]
         about, _ = made(rows, scenes)
         times = "".join(f"{name},engine,-,1,1,3.0\n" for name in scenes)
-        both.append(
-            saved(
-                folder,
-                *rows,
-                times=times,
-                about=about,
-            )
-        )
+        both.append(saved(folder, *rows, times=times, about=about))
     renamed = ["renamed: g -> gate", "renamed: h -> a"]
     for options, many, words in (
         ((), 3, "3 regressions against"),
@@ -533,21 +496,10 @@ def test_of_suites_too_long_to_be_stated_only_the_hash_says_that_scenes_changed(
 def hold(error, reason="fewer digits", **fields):
     """The engine with a tolerance that it states itself."""
     text = f"{error:g} of the scale: {reason}"
-    bound = ErrorBound(
-        STATED_BY_THE_ENGINE,
-        text,
-        error,
-        False,
-    )
-    return Engine(
-        "engine",
-        FreeBody,
-        bound,
-        **fields,
-    )
+    bound = ErrorBound(STATED_BY_THE_ENGINE, text, error, False)
+    return replace(EXACT, tolerance=bound, **fields)
 
 
-EXACT = Engine("engine", FreeBody, EQUIVALENCE)
 RULES = [
     (hold(1e-14), hold(1.001e-14, "because"), ["factor", "reason"]),
     (hold(1e-14), hold(1e-14), []),
@@ -565,7 +517,7 @@ RULES = [
 
 @pytest.mark.parametrize("old, new, what", RULES)
 def test_each_entry_of_a_rule_can_weaken_it(old, new, what):
-    weakened = rules.list_weakened(*(rules.list_rules([one]) for one in (old, new)))
+    weakened = rules.list_weakened(rules.list_rules([old]), rules.list_rules([new]))
     assert [weakening.what for weakening in weakened] == what
 
 
@@ -608,12 +560,7 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
         assert re.match("Weaker rule: engine: factor 1.11.*-> 0.01$", first)
         worse = any(line.startswith("Worse: ") for line in lines)
         assert worse == (night == nights[1])
-        code, _, refused = call(
-            "accept",
-            night,
-            "--to",
-            kept,
-        )
+        code, _, refused = call("accept", night, "--to", kept)
         assert code == BAD_INPUT
         assert "--allow-weaker" in refused and "engine: factor" in refused
     assert accepts(nights[0], "--allow-weaker") == HOLDS
@@ -699,12 +646,7 @@ def nights(tmp_path, saved, accepts):
             about = replace(
                 about, versions=versions, date=DATES[night], commit=f"c{night}"
             )
-            latest = saved(
-                f"night {night}",
-                *rows,
-                times=TIMES,
-                about=about,
-            )
+            latest = saved(f"night {night}", *rows, times=TIMES, about=about)
             assert accepts(latest, "--even-failing", "--allow-weaker") == HOLDS
         return tmp_path / "kept"
 
@@ -833,13 +775,7 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path, monkeypatch, sav
     def fill(source, target):
         """Raise what shutil raises."""
         words = "No space left on device"
-        raise OSError(
-            errno.ENOSPC,
-            words,
-            str(source),
-            None,
-            str(target),
-        )
+        raise OSError(errno.ENOSPC, words, str(source), None, str(target))
 
     monkeypatch.setattr("fourbar_validation.regression.record.shutil.copyfile", fill)
     with raises(OSError) as caught:

@@ -34,7 +34,7 @@ from fourbar_validation.compare.rows import (
     write_rows,
 )
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.engines.registry import ENGINES, WORK
+from fourbar_validation.engines.registry import WORK
 from fourbar_validation.report.html import (
     ALL_OPEN,
     Section,
@@ -76,8 +76,8 @@ def copies(count, *, failing=0):
         name = f"scene-{number:03d}"
         rows = [replace(row, scene=name) for row in demo().rows]
         if number < failing:
-            index = next(i for i, row in enumerate(rows) if row.quantity == "torque")
-            rows[index] = replace(rows[index], error=0.5, verdict=FAILS)
+            torque = next(row for row in rows if row.quantity == "torque")
+            rows[rows.index(torque)] = fail(torque, 0.5)
         made.append(replace(demo(), name=name, rows=rows))
     return made
 
@@ -126,7 +126,7 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
     assert summary.headline.startswith("FAILS: ")
     body = unescape(text[text.index("<body>") :])
     parts = (summary.headline, "What fails</h2>", "Independent engines</h2>")
-    places = [body.index(part) for part in parts]
+    places = [*map(body.index, parts)]
     assert places == sorted(places)
     assert "What fails</h2>" not in report(copies(3))[1]
 
@@ -207,13 +207,8 @@ def test_every_kind_of_scene_is_drawn(motion, pictures):
 
 
 def test_an_engine_that_is_missing_is_reported_as_failing():
-    absent = replace(ENGINES[0], start=lambda: import_module("tests.absent"))
-    record = judge_for_report(
-        "demo",
-        crank_rocker(),
-        (absent,),
-        draw=False,
-    )
+    absent = replace(EXACT[0], start=lambda: import_module("tests.absent"))
+    record = judge_for_report("demo", crank_rocker(), (absent,), draw=False)
     summary, text = report([record])
     assert summary.verdict.startswith("FAILS")
     assert "What fails</h2>" in text and "No module named" in text and ">inf<" in text
@@ -271,28 +266,9 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     """
     monkeypatch.setenv("COLUMNS", "100")
     simulated = ("first", "mujoco-simulated", "RK4", "F12")
-    row = Row(
-        *simulated,
-        error,
-        allowed,
-        AGREES,
-        "",
-        math.radians(40.0),
-        1.0,
-    )
-    share = replace(
-        row,
-        quantity="undecided",
-        error=0.4,
-        allowed=0.5,
-        theta_2=math.nan,
-    )
-    identity = replace(
-        row,
-        engine="formulas",
-        quantity="torque",
-        error=0.0,
-    )
+    row = Row(*simulated, error, allowed, AGREES, "", math.radians(40.0), 1.0)
+    share = replace(row, quantity="undecided", error=0.4, allowed=0.5)
+    identity = replace(row, engine="formulas", quantity="torque", error=0.0)
     torque = replace(row, quantity="torque", error=1e-12, allowed=1e-6)
     refused = replace(row, quantity="theta_3", verdict=REFUSES, reason="too fast")
     rows = [row, share, identity, torque, refused]
@@ -330,12 +306,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
 
 
 def record_of(name, rows, **parts):
-    return Record(
-        name,
-        title=name,
-        rows=rows,
-        **parts,
-    )
+    return Record(name, title=name, rows=rows, **parts)
 
 
 def fail(row, error=1e-3):
@@ -357,12 +328,11 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
     chance.
     """
     swapped = "F32 and F43 are exchanged: F32, F43, all else agrees"
-    sign = "sign reversed"
     scenes = []
     for k in range(23):
         of_scene = mine(scene=f"scene {k:02d}")
         wrong = [fail(replace(of_scene, quantity=name)) for name in ("F32", "F43")]
-        causes = {"mine": [sign, swapped] if k < 3 else [swapped]}
+        causes = {"mine": ["sign reversed"] * (k < 3) + [swapped]}
         scenes.append(record_of(of_scene.scene, [of_scene, *wrong], causes=causes))
     said = "said what is no JSON (Expecting ','); it said: "
     for scene, numbers in zip(scenes[:2], ("[0.25, 0.5", "[-0.125"), strict=True):
@@ -381,53 +351,28 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
     assert "fails scene" not in text, "rows stay in the files"
 
 
+def draw_answer(*rows, **numbers):
+    """Draw the scene with these rows of an engine and what it answered."""
+    answer = Answer("mine", "exact", SOLUTION.at, SOLUTION.assembled, numbers)
+    record = Record("s", SCENE, rows=[*rows], solution=SOLUTION, answers=[answer])
+    return draw_scene_figure(record) or ""
+
+
 @pytest.mark.slow
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
-    numbers = {"torque": SOLUTION.torque, "F43": -SOLUTION.F43}
-    answer = Answer(
-        "mine",
-        "exact",
-        SOLUTION.at,
-        SOLUTION.assembled,
-        numbers,
-    )
-    row = mine(
-        quantity="F43",
-        error=2.0,
-        allowed=1e-6,
-        verdict=FAILS,
-    )
+    row = mine(quantity="F43", error=2.0, allowed=1e-6, verdict=FAILS)
     largest = int(np.argmax(np.max(np.abs(SOLUTION.F43), axis=0)))
-    record = Record(
-        "s",
-        SCENE,
-        rows=[row],
-        solution=SOLUTION,
-        answers=[answer],
-    )
-    drawn = draw_scene_figure(record) or ""
+    drawn = draw_answer(row, torque=SOLUTION.torque, F43=-SOLUTION.F43)
     assert f"F43 {'xy'[largest]} (N)" in drawn and "allowed to mine" in drawn
-    held = replace(record, rows=[replace(row, verdict=AGREES, allowed=1e-14)])
-    drawn = draw_scene_figure(held) or ""
+    held = replace(row, verdict=AGREES, allowed=1e-14)
+    drawn = draw_answer(held, torque=SOLUTION.torque, F43=-SOLUTION.F43)
     assert "allowed to mine" not in drawn
 
 
 RIGHT = [mine(quantity=name) for name in ("F12", "theta_3")]
-OPEN = mine(
-    quantity="assembled",
-    error=9.0,
-    allowed=0.0,
-    verdict=FAILS,
-)
-DEAD = Row.unmeasured(
-    "a",
-    "mine",
-    "",
-    "all",
-    FAILS,
-    "exit status 3 after 4 s",
-)
+OPEN = mine(quantity="assembled", error=9.0, allowed=0.0, verdict=FAILS)
+DEAD = Row.unmeasured("a", "mine", "", "all", FAILS, "exit status 3 after 4 s")
 ALARM = Row.unmeasured("a", "mine", "", "watch", FAILS, "3 resets")
 UNKNOWN = "no known mistake explains it"
 CAUSES = [
@@ -472,13 +417,12 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
 
 def test_what_differs_from_two_engines_is_listed_and_shown_first():
     """The identity that fails with it has the larger error, and is a consequence."""
-    names = ("torque", *PIN_FORCES, "theta_3")
     rows = [
         fail(mine(engine=FORMULAS, quantity="power"), 0.9),
         fail(mine(engine="one"), 0.3),
         fail(mine(engine="one", quantity="torque_inertia"), 0.2),
     ]
-    against = {name: ["one", "two"] for name in names}
+    against = {key: ["one", "two"] for key in ("torque", *PIN_FORCES, "theta_3")}
     summary = summary_of([record_of("a", rows, against=against)])
     (cause,) = summary.causes
     words = "one, two agree with each other, and differ from it in"
@@ -513,8 +457,7 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
     """
     named = {"named": ["gravity is left out"]}
     record = record_of("a", [*rows, ALONE], against=against, causes=named)
-    summary = summary_of([record])
-    assert {cause.engine for cause in summary.causes} == wrong
+    assert {cause.engine for cause in summary_of([record]).causes} == wrong
 
 
 def test_pin_forces_of_which_one_fails_do_not_agree():
@@ -538,14 +481,7 @@ def test_all_scenes_that_fail_have_pictures_and_some_that_hold(row, pictured):
 
 
 def refuse(scene, reason):
-    return Row.unmeasured(
-        scene,
-        "theirs",
-        "",
-        "all",
-        REFUSES,
-        reason,
-    )
+    return Row.unmeasured(scene, "theirs", "", "all", REFUSES, reason)
 
 
 def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
@@ -553,11 +489,9 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
     rows = [refuse(f"s{k}", f"signs {[1] * k} are lost") for k in (2, 3, 4)]
     rows.append(refuse("s", "it reads no cylinder"))
     alike = [refuse(f"s{k}", "4 bars, not 5") for k in (1, 2)]
+    others = "signs [1, 1] are lost, with other numbers in the others"
     for refusals, words in (
-        (
-            rows,
-            "(3 scenes): signs [1, 1] are lost, with other numbers in the others",
-        ),
+        (rows, f"(3 scenes): {others}"),
         (alike, "(2 scenes): 4 bars, not 5"),
     ):
         summary = summary_of(record_of(row.scene, [row]) for row in refusals)
@@ -631,15 +565,7 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     monkeypatch.setenv("COLUMNS", columns)
     scene = "thesis_printed_inertias"
     key = (scene, "mujoco-simulated", "RK4", "limit_positions")
-    row = Row(
-        *key,
-        3.14,
-        1e-9,
-        FAILS,
-        "",
-        theta_2,
-        0.3,
-    )
+    row = Row(*key, 3.14, 1e-9, FAILS, "", theta_2, 0.3)
     text = printed(summary_of([record_of(scene, [row])]), verbose=True)
     cells = ["limit_positions", "3.14e+00", "1.00e-09", "3.1e+09", at]
     shown = re.findall("^ mujoco-simulated, \\w*(.*)", text, re.MULTILINE)
@@ -652,22 +578,7 @@ def test_the_picture_shows_the_pin_force_that_fails():
     sizes = {name: magnitude(SOLUTION[name]).max() for name in PIN_FORCES}
     largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
     numbers = {name: SOLUTION[name] for name in ("torque", *PIN_FORCES)}
-    answer = Answer(
-        "free-body",
-        "exact",
-        fourbar.command(SCENE),
-        quantities=numbers,
-    )
-    record = Record(
-        "demo",
-        SCENE,
-        solution=SOLUTION,
-        answers=[answer],
-    )
-    assert f">{largest} " in (draw_scene_figure(record) or "")
-    record.rows = [
-        fail(mine(quantity=other), error=0.5),
-        fail(mine(quantity=largest)),
-    ]
-    drawn = draw_scene_figure(record) or ""
+    assert f">{largest} " in draw_answer(**numbers)
+    rows = fail(mine(quantity=other), error=0.5), fail(mine(quantity=largest))
+    drawn = draw_answer(*rows, **numbers)
     assert f">{other} " in drawn and f">{largest} " not in drawn
