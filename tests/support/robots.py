@@ -22,10 +22,16 @@ from fourbar_validation.engines.mujoco.robots.measure import (
     measure_loops,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import judge_file, list_answers
 
 Point = tuple[float, float]
+FOOT, GRIPPER = (
+    (MODELS / "robots" / f"{name}.xml").read_text()
+    for name in ("biped_foot", "gripper")
+)
+"""Our models of a biped's foot and of a gripper of two fingers."""
 TILT = (0.3, -0.2, 0.7, 0.5)
 """Quaternion of the ground's body, not normalized."""
 

@@ -1,9 +1,11 @@
 """A loop inside its robot.
 
-MuJoCo asked a second way in the whole model, and the formulas.
+MuJoCo asked a second way in the whole model, and the formulas of its scene. Every other
+joint of the robot stands still.
 """
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import mujoco
@@ -28,28 +30,71 @@ from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.places import MODELS
-from fourbar_validation.robots.files import read_robot
 from tests.support.robots import (
     ADAPTIVE,
     AS_DRAWN,
     EXCAVATOR,
     FINGER,
+    FOOT,
+    GRIPPER,
     LIFTED,
+    Planar,
     draw_knee,
     file_of,
     pose_loop,
 )
 
-ROBOTS = MODELS / "robots"
+ATTITUDE = GRIPPER.replace(
+    '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
+)
 LOOPS = {
-    "biped_foot": (read_robot(ROBOTS / "biped_foot.xml"), None, {}),
-    "gripper": (read_robot(ROBOTS / "gripper.xml"), None, {}),
+    "biped_foot": (FOOT, None, {}),
+    "gripper": (GRIPPER, None, {}),
     "finger": (FINGER, "pip_link-middle", {}),
     "adaptive": (ADAPTIVE, "follower-coupler", {"held": ("spring_link",)}),
     "excavator": (EXCAVATOR, "bucket_linkage", {"drive": "rocker"}),
     "lifted": (LIFTED, "rod-arm", {}),
 }
 """A file, the loop that is asked of it, and how it is posed; None: the first loop."""
+SPRUNG = {
+    "springs": Planar(joint='stiffness="2" springref="4.5"'),
+    "springs wound beyond half a turn": Planar(joint='stiffness="0.5" springref="-4"'),
+    "gravcomp": Planar(),
+    "damping and friction": Planar(joint='damping="0.1" frictionloss="0.2"'),
+    "output armature": Planar(cut="A", by="site"),
+    "closure on the ground": Planar(cut="O4"),
+    "axis the other way": Planar(
+        axes={"O2": "0 0 -1", "A": "0 0 -1"}, joint='stiffness="1"'
+    ),
+}
+
+
+def write_acting(name):
+    """Write a four-bar on a hinge in which an effect acts."""
+    planar = replace(SPRUNG[name], base='<joint name="base" axis="0 1 0"/>')
+    text = planar.text()
+    if name == "gravcomp":
+        text = text.replace(
+            '<body name="coupler"', '<body name="coupler" gravcomp="0.7"'
+        )
+    if name == "output armature":
+        text = text.replace('name="O4" axis', 'name="O4" armature="0.02" axis')
+        text = text.replace('name="O2" axis', 'name="O2" armature="0.03" axis')
+    return text.replace('name="O2" ', 'name="O2" range="-0.5 0.4" limited="true" ')
+
+
+WHOLE = {
+    **LOOPS,
+    "left finger": (GRIPPER, "left_finger-left_follower", {}),
+    "in another attitude": (ATTITUDE, None, {"joints": {"wrist": "30deg"}}),
+    "foot in a keyframe": (FOOT, None, {"key": "crouch"}),
+    "gravcomp away from the mass centre": (
+        FOOT.replace('<body name="toe"', '<body name="toe" gravcomp="1"'),
+        None,
+        {},
+    ),
+    **{name: (write_acting(name), None, {}) for name in SPRUNG},
+}
 ASKED_TWICE = 1e-6
 """Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
 RIGID = 1e-8
@@ -58,7 +103,7 @@ RIGID = 1e-8
 
 @cache
 def open_loop(name):
-    file, closing, pose = LOOPS[name]
+    file, closing, pose = WHOLE[name]
     parts = pose_loop(file, closing, **pose)
     _, posed, loop = parts
     return LoopInside(posed.model, loop), make_loop_scene(*parts, 2.0)
@@ -158,7 +203,7 @@ ROUNDED = 1e-12
 """Relative; 1e-15 as measured, and 4e-10 are from soft to rigid pins."""
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", WHOLE)
 def test_rigid_pins_in_the_robot_are_the_formulas_of_its_scene(name):
     """Multipliers on MuJoCo's mass matrix of the whole robot are the forces of a scene
     of three bars, and of its free bodies.

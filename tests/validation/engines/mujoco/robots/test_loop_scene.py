@@ -1,9 +1,6 @@
-"""A scene from a loop against MuJoCo, asked in the whole robot.
+"""A scene from a loop: what acts in it, how far it moves, and what it leaves out.
 
-Inverse dynamics, and multipliers of the closure. Every other joint of the robot stands
-still. Nothing of the scene enters: the loop is closed by Newton's method on MuJoCo's
-own residual of the equality, its speeds and accelerations follow from MuJoCo's
-Jacobian.
+`test_inside.py` holds its torque and pin forces against MuJoCo in the whole robot.
 """
 
 import cmath
@@ -17,187 +14,8 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
-from fourbar_validation.places import MODELS
-from tests.support.robots import Planar, forward, read_scene
+from tests.support.robots import FOOT, GRIPPER, Planar, forward, read_scene
 from tests.support.rows import read_rows
-
-FOOT, GRIPPER = (
-    (MODELS / "robots" / f"{name}.xml").read_text()
-    for name in ("biped_foot", "gripper")
-)
-EXACT = 1e-8
-"""Relative: the difference quotient of the Jacobian loses half the digits of a double.
-"""
-DIFFERENCE = 1e-5
-"""s, step of that quotient along the motion."""
-
-
-class WholeRobot:
-    """A robot's model that answers for one loop while everything else stands still."""
-
-    def __init__(self, text, made):
-        self.model = model = mujoco.MjModel.from_xml_string(text)
-        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS"):
-            model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
-        self.data = mujoco.MjData(model)
-        self.data.eq_active[:] = 0
-        self.data.eq_active[made.loop.equality] = 1
-        self.loop = made.loop
-        hinges = made.loop.hinges
-        passive = [joint for pin, joint in hinges.items() if pin != "O2"]
-        self.lead = model.jnt_dofadr[hinges["O2"]]
-        self.lead_place = model.jnt_qposadr[hinges["O2"]]
-        self.others = model.jnt_dofadr[passive]
-        self.places = model.jnt_qposadr[passive]
-
-    def closure(self, qpos):
-        """Residual of the equality and its derivative."""
-        self.data.qpos[:] = qpos
-        mujoco.mj_fwdPosition(self.model, self.data)
-        rows = self.data.nefc
-        jacobian = self.data.efc_J.reshape(-1, self.model.nv)[:rows]
-        return self.data.efc_pos[:rows].copy(), jacobian.copy()
-
-    def place(self, qpos, angle):
-        """Turn the driven joint to an angle and close the loop from a near pose."""
-        qpos = qpos.copy()
-        qpos[self.lead_place] = angle
-        for _ in range(50):
-            residual, jacobian = self.closure(qpos)
-            step = np.linalg.lstsq(jacobian[:, self.others], -residual, rcond=1e-9)[0]
-            qpos[self.places] += step
-            if np.abs(step).max() < 1e-14:
-                break
-        return qpos
-
-    def rates(self, jacobian, driven, rest):
-        """Solve J rates + rest = 0 with the driven rate given.
-
-        All other joints are still.
-        """
-        rates = np.zeros(self.model.nv)
-        rates[self.lead] = driven
-        wanted = -(jacobian @ rates + rest)
-        solved = np.linalg.lstsq(jacobian[:, self.others], wanted, rcond=1e-9)[0]
-        rates[self.others] = solved
-        return rates
-
-    def ask(self, qpos, omega):
-        """Torque, and the size of the force in the plane at each pin, at a closed pose.
-
-        The driven joint has constant speed.
-        """
-        model, data = self.model, self.data
-        _, jacobian = self.closure(qpos)
-        still = np.zeros(len(jacobian))
-        speeds = self.rates(jacobian, omega, still)
-        drift = still.copy()
-        for side in (1.0, -1.0):
-            moved = qpos.copy()
-            mujoco.mj_integratePos(model, moved, speeds, side * DIFFERENCE)
-            drift += side * self.closure(moved)[1] @ speeds / (2.0 * DIFFERENCE)
-        accelerations = self.rates(jacobian, 0.0, drift)
-        data.qpos[:], data.qvel[:], data.qacc[:] = qpos, speeds, accelerations
-        data.eq_active[self.loop.equality] = 0
-        mujoco.mj_inverse(model, data)
-        data.eq_active[self.loop.equality] = 1
-        needed = data.qfrc_inverse + model.dof_frictionloss * np.sign(speeds)
-        rows = [self.lead, *self.others]
-        drive = np.zeros((model.nv, 1))
-        drive[self.lead] = 1.0
-        matrix = np.hstack([jacobian.T, drive])[rows]
-        solved = np.linalg.lstsq(matrix, needed[rows], rcond=1e-9)[0]
-        return {"torque": solved[-1]} | self.pin_forces(qpos, solved[:-1])
-
-    def pin_forces(self, qpos, multipliers):
-        """Sizes in the plane, from the recursion of MuJoCo.
-
-        The closing force and gravcomp are applied.
-        """
-        model, data = self.model, self.data
-        self.closure(qpos)
-        data.efc_force[: len(multipliers)] = multipliers
-        lifted = model.body_gravcomp * model.body_mass
-        data.xfrc_applied[:, :3] = -np.outer(lifted, model.opt.gravity)
-        mujoco.mj_rnePostConstraint(model, data)
-        axis = data.xaxis[self.loop.joint]
-        data.xfrc_applied[:] = 0.0
-        forces = {self.loop.cut: multipliers[:3]}
-        for pin, joint in self.loop.hinges.items():
-            forces[pin] = data.cfrc_int[model.jnt_bodyid[joint], 3:]
-        return {
-            pin: float(np.linalg.norm(force - (force @ axis) * axis))
-            for pin, force in forces.items()
-        }
-
-
-def compare(text, made):
-    """Hold torque and pin forces of the scene's sweep against the whole robot."""
-    robot = WholeRobot(text, made)
-    solution = fourbar.solve(made.scene)
-    names = {"O2": "F12", "A": "F32", "B": "F43", "O4": "F14"}
-    due = {pin: np.linalg.norm(solution[name], axis=1) for pin, name in names.items()}
-    due["torque"] = solution.torque
-    in_pose = made.loop.qpos[robot.lead_place]
-    for row in np.linspace(0, len(solution) - 1, 12, dtype=int):
-        turned = math.remainder(solution.theta_2[row] - made.loop.angles[1], math.tau)
-        qpos = made.loop.qpos
-        for part in np.linspace(0.0, turned, 20)[1:]:  # on the same branch
-            qpos = robot.place(qpos, in_pose + part)
-        for name, size in robot.ask(qpos, 3.0).items():
-            allowed = EXACT * np.abs(due[name]).max()
-            assert size == approx(due[name][row], abs=allowed), name
-
-
-ATTITUDE = GRIPPER.replace(
-    '<body name="palm" pos="0 0 0.5">', '<body name="palm" euler="20 40 60">'
-)
-RIGHT = {
-    "right finger": (GRIPPER, {"loop": "right_finger-right_follower"}),
-    "left finger": (GRIPPER, {"loop": "left_finger-left_follower"}),
-    "in another attitude": (
-        ATTITUDE,
-        {"loop": "right_finger-right_follower", "joints": {"wrist": "30deg"}},
-    ),
-    "foot": (FOOT, {}),
-    "foot in a keyframe": (FOOT, {"key": "crouch"}),
-}
-
-
-@pytest.mark.parametrize("name", RIGHT)
-def test_torques_and_forces_are_those_of_the_whole_robot(name):
-    text, asked = RIGHT[name]
-    compare(text, read_scene(text, **asked))
-
-
-EVERYTHING = {
-    "springs": Planar(joint='stiffness="2" springref="4.5"'),
-    "springs wound beyond half a turn": Planar(joint='stiffness="0.5" springref="-4"'),
-    "gravcomp": Planar(),
-    "damping and friction": Planar(joint='damping="0.1" frictionloss="0.2"'),
-    "output armature": Planar(cut="A", by="site"),
-    "closure on the ground": Planar(cut="O4"),
-    "axis the other way": Planar(
-        axes={"O2": "0 0 -1", "A": "0 0 -1"}, joint='stiffness="1"'
-    ),
-}
-
-
-@pytest.mark.parametrize("name", EVERYTHING)
-def test_every_effect_is_that_of_the_whole_robot(name):
-    planar = replace(EVERYTHING[name], base='<joint name="base" axis="0 1 0"/>')
-    text = planar.text()
-    if name == "gravcomp":
-        text = text.replace(
-            '<body name="coupler"', '<body name="coupler" gravcomp="0.7"'
-        )
-    if name == "output armature":
-        text = text.replace('name="O4" axis', 'name="O4" armature="0.02" axis')
-        text = text.replace('name="O2" axis', 'name="O2" armature="0.03" axis')
-    text = text.replace('name="O2" ', 'name="O2" range="-0.5 0.4" limited="true" ')
-    made = read_scene(text)
-    compare(text, made)
 
 
 def test_a_motor_counts_behind_its_gear():
@@ -388,7 +206,6 @@ def test_gravcomp_away_from_the_mass_centre_is_a_load_where_it_acts():
     assert load.from_pin[0] == approx(abs(toe))
     turned = math.remainder(cmath.phase(toe / rod) - load.from_pin[1], math.tau)
     assert turned == approx(0.0, abs=1e-9)
-    compare(text, made)
 
 
 def test_a_loop_is_asked_for_where_there_are_several():

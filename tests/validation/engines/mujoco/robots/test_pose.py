@@ -15,10 +15,8 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.places import MODELS
+from tests.support.robots import FOOT
 from tests.support.shares import slow_but
-
-FOOT = (MODELS / "robots" / "biped_foot.xml").read_text()
 
 
 def pose(text, key=None, **joints):
