@@ -32,12 +32,12 @@ from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import SceneBlock
 from fourbar.show.driving import read_drive_demand
-from fourbar.show.motion_curves import find_drive_rounding, take_positions
+from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
 from fourbar.show.plot.view import list_limits
 from fourbar.show.shown_units import COMMON, write_short
 from fourbar.show.studies import write_type
 from fourbar.show.summary import Facts
-from fourbar.solution import Conversion, write_csv
+from fourbar.solution import Conversion, Solution, write_csv
 from fourbar.solving import find_last_stage, solve
 from fourbar.studies.passing import say_nowhere
 from fourbar.writing import write_text
@@ -91,29 +91,31 @@ def evaluate_scene(
     ]
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}
+    facts = None
     if settled:  # what `analyze` and `classify` print
-        block = SceneBlock(solution, shown_units, pressure)
+        facts = SceneBlock(solution, shown_units, pressure)
         limits = write_type(scene.linkage, shown_units, everything=True)
-        data["summary"] = [*block.write(), "", *limits]
-        facts: Facts = block
+        data["summary"] = [*facts.write(), "", *limits]
         if len(solution) > 1:  # the curves are those of a sweep
-            data["peaks"] = list_peaks(facts)
-    else:
-        facts = Facts(solution, take_positions(solution, bent=False))
-    data["headline"] = write_headline(facts, shown_units, settled=settled)
+            data["peaks"] = list_peaks(solution, facts)
+    data["headline"] = write_headline(solution, shown_units, facts)
     return data
 
 
-def write_headline(facts: Facts, units: Conversion, *, settled: bool) -> str:
+def write_headline(
+    solution: Solution,
+    units: Conversion,
+    facts: Facts | None,
+) -> str:
     """Write the drive's peak, the largest pin force and the least transmission angle.
 
-    `settled`: the facts are those of the motion; those of the positions alone are
-    reached at least.
+    `facts`: those of the solution; without them numbers are said to be reached at
+    least.
     """
-    peaks = list_peaks(facts)
-    drive = read_drive_demand(facts.solution)
-    located = settled or facts.kind == "position"
-    among = " (of these positions)" if settled and facts.kind == "list" else ""
+    peaks = list_peaks(solution, facts)
+    drive = read_drive_demand(solution)
+    reached = "" if facts is not None or len(solution) == 1 else "at least "
+    among = " (of these positions)" if facts and facts.kind == "list" else ""
     parts = []
     for what, unit, names in (
         (f"peak {drive.name}", drive.unit, {"": drive.keys.value}),
@@ -124,30 +126,41 @@ def write_headline(facts: Facts, units: Conversion, *, settled: bool) -> str:
         text = "grows without bound"
         if sizes and not places:
             size, place = max((size or 0.0, at) for at, size in sizes.items())
-            text = write_short(size, unit, units)
-            text = text if located else f"at least {text}"
+            text = f"{reached}{write_short(size, unit, units)}"
             places = [place]
         at_pins = ", ".join(filter(None, places))
         if sizes:
             parts.append(f"{what} {text}{at_pins and f' at {at_pins}'}{among}")
-    least = f"{math.degrees(facts.transmission.value):.1f}°"
-    least = least if located else f"at most {least}"
-    parts.append(f"least transmission angle {least}{among}")
+    if facts is None:
+        least = math.asin(min(float(np.nanmin(np.abs(solution.sin_mu))), 1.0))
+        reached = reached.replace("least", "most")
+    else:
+        least = facts.transmission.value
+    parts.append(f"least transmission angle {reached}{math.degrees(least):.1f}°{among}")
     return "; ".join(parts)
 
 
-def list_peaks(facts: Facts) -> dict[str, float | None]:
-    """List the largest magnitudes of drive and pin forces; None: without bound, SI."""
-    drive = read_drive_demand(facts.solution).keys.value
+def list_peaks(solution: Solution, facts: Facts | None) -> dict[str, float | None]:
+    """List the largest magnitudes of drive and pin forces; None: without bound, SI.
+
+    `facts`: where they are located between the positions.
+    """
+    sizes = {} if solution.F12 is None else compute_pin_loads(solution)
+    drive = read_drive_demand(solution)
+    is_driven = solution.scene is None or solution.scene.motion.free is None
+    if is_driven and drive.values is not None:
+        sizes[drive.keys.value] = drive.sizes
     peaks = dict[str, float | None]()
-    for name in (*PIN_FORCE.values(), drive):
-        curve = facts.motion.panels.curves.get(name)
-        if curve is not None and np.isfinite(curve.values).any():
+    for name, values in sizes.items():
+        if not np.isfinite(values).any():
+            continue
+        peaks[name] = float(np.nanmax(values))
+        if facts is not None:
             peak = facts.motion.find_peak(name)
             peaks[name] = peak and abs(peak.value)
-    size = peaks.get(drive)
-    if size is not None and size <= find_drive_rounding(facts.solution):
-        peaks[drive] = 0.0
+    size = peaks.get(drive.keys.value)
+    if size is not None and size <= find_drive_rounding(solution):
+        peaks[drive.keys.value] = 0.0
     return peaks
 
 

@@ -266,7 +266,7 @@ class Session:
         None if it states one position: its curves go on over the whole range.
         """
         kept = solve(self.read(self.kept[self.reference]).scene)
-        return list_peaks(Facts(kept)) if len(kept) > 1 else {}
+        return list_peaks(kept, Facts(kept)) if len(kept) > 1 else {}
 
     def do(self, asked: Asked) -> Asked:
         """Do what a page asks for and describe the state after it.

@@ -234,32 +234,23 @@ def describe_motion(solution: Solution) -> MotionCurves:
     return curves
 
 
-def take_positions(solution: Solution, *, bent: bool = True) -> MotionCurves:
-    """Describe a motion by its positions, between which nothing is searched.
-
-    `bent`: with bending moments, which take most of the time.
-    """
-    scene = solution.scene
-    share = np.ones(len(solution))
-    if is_once_round(solution):
-        share[-1] = 0.0  # the first position again
-    curves = _take_values(_list_curves(solution, bent=bent))
-    panels = Panels.of_positions(solution.at.places, curves, share)
-    extremes = solution
-    if solution.with_extremes is not None:
-        extremes = solve(scene, "position", at=solution.with_extremes)
-    curves = _take_values(_list_position_curves(extremes))
-    share = np.ones(len(extremes))
-    positions = Panels.of_positions(extremes.at.places, curves, share)
-    _mark_poles(scene, solution, panels)
-    return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
-
-
 def _fit_curves(solution: Solution) -> MotionCurves:
     """Fit the curves of a motion, or take those of its positions."""
     scene = solution.scene
     if not goes_on_between(scene, solution):
-        return take_positions(solution)
+        share = np.ones(len(solution))
+        if is_once_round(solution):
+            share[-1] = 0.0  # the first position again
+        curves = _take_values(_list_curves(solution))
+        panels = Panels.of_positions(solution.at.places, curves, share)
+        extremes = solution
+        if solution.with_extremes is not None:
+            extremes = solve(scene, "position", at=solution.with_extremes)
+        curves = _take_values(_list_position_curves(extremes))
+        share = np.ones(len(extremes))
+        positions = Panels.of_positions(extremes.at.places, curves, share)
+        _mark_poles(scene, solution, panels)
+        return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
     exact, even = _cut(scene, solution)
     zeros, rests = _locate_breaks(scene, solution, _join_edges(exact, even))
     corners = exact[: 0 if scene.motion.law is None else None]
@@ -438,7 +429,7 @@ def _list_curves(solution: Solution, *, bent: bool = True) -> _Curves:
     Commanded rates end, as all others do, where the linkage ceases to assemble.
 
     `bent`: False to leave out the values of bending moments, which take most of the
-    time.
+    time, where only what is asked of the curves is wanted.
     """
     scene = solution.scene
     curves: _Curves = {}
@@ -457,7 +448,7 @@ def _list_curves(solution: Solution, *, bent: bool = True) -> _Curves:
     asked = Wanted(rounding * max(solution.lengths))
     bending = compute_bending(solution) if bent else {}
     for bar in MOVING_BARS:
-        moment = np.abs(bending[bar].moment) if bent else np.full(len(solution), np.nan)
+        moment = np.abs(bending[bar].moment) if bent else np.zeros(0)
         curves[f"bending_{bar}"] = moment, asked
     drive = read_drive_demand(solution)
     if scene.motion.free is not None:

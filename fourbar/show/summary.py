@@ -23,7 +23,6 @@ from fourbar.show.driving import (
 )
 from fourbar.show.duty import MotorDuty, motor_duty
 from fourbar.show.motion_curves import (
-    MotionCurves,
     compute_bending,
     compute_pin_loads,
     describe_motion,
@@ -80,14 +79,13 @@ class Facts:
     ----------
     solution : of a scene, solved up to the forces or the error bars; at least one
         position assembles.
-    motion : curves over the motion, with what grows without bound; left out: those of
-        `describe_motion`.
     """
 
-    def __init__(self, solution: Solution, motion: MotionCurves | None = None) -> None:
+    def __init__(self, solution: Solution) -> None:
         self.solution = solution
         self.scene = solution.scene
-        self.motion = motion or describe_motion(solution)
+        self.motion = describe_motion(solution)
+        """Curves over the motion, with what grows without bound."""
 
     @cached_property
     def kind(self) -> str:
