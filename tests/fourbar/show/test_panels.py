@@ -1,6 +1,6 @@
 """Integrals of curves over a motion against their antiderivatives."""
 
-from math import cos, exp, pi, sin, sqrt
+from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
@@ -22,31 +22,6 @@ def fit(curve, edges=EDGES, wanted="integrated"):
     return fit_panels(compute, edges, {"curve": Wanted(**{wanted: True})})
 
 
-def integrate_product(x):
-    """Integral of (e^{-x} cos 20 x)^2, by its complex exponents."""
-    fast = np.exp(complex(-2.0, 40.0) * x) / complex(-2.0, 40.0)
-    return float(-0.25 * np.exp(-2.0 * x) + 0.5 * fast.real)
-
-
-@pytest.mark.parametrize(
-    "curve, right",
-    [
-        (
-            lambda x: np.exp(-x) * np.cos(20.0 * x),
-            integrate_product(2.0) - integrate_product(0.0),
-        ),
-        # 9 cos^2 + 16 sin^2 = 12.5 - 3.5 cos 2x
-        (
-            lambda x: np.stack((3.0 * np.cos(x), 4.0 * np.sin(x)), axis=-1),
-            25.0 - 1.75 * sin(4.0),
-        ),
-    ],
-    ids=("number", "vector"),
-)
-def test_the_mean_square_is_that_of_the_antiderivative(curve, right):
-    assert fit(curve).find_rms("curve") ** 2 == approx(0.5 * right, rel=SETTLED)
-
-
 @pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
 def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
@@ -56,24 +31,6 @@ def test_a_jump_costs_no_digits(place):
     turns = panels.accumulate("curve")
     assert turns.max() == approx(2.0 * place, rel=1e-8)
     assert not panels.growing
-
-
-def test_a_curve_is_integrated_from_zero_to_zero():
-    """The sine of 3 x gives 2/3 in each half wave, wherever the panels end."""
-    panels = fit(lambda x: np.sin(3.0 * x), np.array([0.0, 1.3, 2.0]))
-    steps = np.diff(panels.accumulate("curve"))
-    # the second half wave ends at 2 pi/3, beyond the motion
-    assert steps[steps > 0.0].sum() == approx(2.0 / 3.0, rel=SETTLED)
-    down = (1.0 + cos(6.0)) / 3.0
-    assert -steps[steps < 0.0].sum() == approx(down, rel=SETTLED)
-
-
-def test_the_range_of_the_integral_about_a_level():
-    """Of 1/2 + sin(pi x) less its mean it is that of -cos(pi x)/pi."""
-    panels = fit(lambda x: 0.5 + np.sin(pi * x), np.array([0.0, 0.7, 2.0]))
-    assert panels.integrate("curve") == approx(1.0, rel=SETTLED)
-    about_mean = panels.accumulate("curve", 0.5)
-    assert np.ptp(about_mean) == approx(2.0 / pi, rel=SETTLED)
 
 
 POLE = sqrt(0.5)
