@@ -15,7 +15,6 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
 from fourbar_validation.engines.mujoco.robots.answers import (
-    RobotSettings,
     SettingsAdvice,
     TriedSettings,
     WorstState,
@@ -39,7 +38,6 @@ from tests.support.rows import read_rows
 
 SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
 """A parallelogram, in line at 0 and 180 deg."""
-SETTINGS = RobotSettings((0.02, 1.0), (0.9,), 1e-3, "Euler", "Newton", 100, 1e-8)
 
 
 @cache
@@ -78,7 +76,7 @@ def test_percentages_have_one_notation(part, written):
 
 def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
     missing = WorstState(math.inf)
-    tried = TriedSettings(SETTINGS, {}, WorstState(0.1), missing, math.inf, math.inf)
+    tried = TriedSettings({}, WorstState(0.1), missing, *[math.inf] * 3)
     advice = SettingsAdvice(0.2, 9, tried, (), tried, 1, (), None)
     *_, table = describe_advice(SimpleNamespace(refusal="too many"), advice)
     assert table.rows == [("nothing", "0.1", "-", "-")]
@@ -87,9 +85,9 @@ def test_settings_of_too_many_steps_have_neither_an_error_nor_a_cost():
 def test_what_has_no_answer_is_no_number_of_a_sentence():
     """Of the file as it is MuJoCo loses the motion."""
     missing, found = WorstState(math.inf), WorstState(0.1, "F12", 0.5, 0.5)
-    before = TriedSettings(SETTINGS, {}, found, missing, math.inf, 1e-5)
+    before = TriedSettings({}, found, missing, math.inf, 1e-5, 1e-2)
     changes = {"timestep": "0.0001"}
-    best = TriedSettings(SETTINGS, changes, found, found, 1e-4, 2e-5)
+    best = TriedSettings(changes, found, found, 1e-4, 2e-5, 2e-2)
     advice = SettingsAdvice(0.2, 9, before, (), best, 1, (), None)
     (loop,) = measured().loops
     *_, reached, _, _ = describe_advice(loop, advice)
@@ -164,7 +162,7 @@ def test_a_limit_of_the_bar_that_is_driven_is_told():
 def test_advice_begins_with_what_was_reached(solref, error, reached, said):
     changes, error = {"solref": solref} if solref else {}, float(error)
     worst = WorstState(error, "F12", 0.5, 0.5)
-    tried = TriedSettings(SETTINGS, changes, worst, WorstState(0.0), 0.0, 1e-6)
+    tried = TriedSettings(changes, worst, WorstState(0.0), 0.0, 1e-6, 1e-3)
     advice = SettingsAdvice(0.01, 5, tried, (), tried, 9, (), None)
     assert advice.reached == bool(reached)
     loop = SimpleNamespace(refusal="too many steps", scene=SCENE, joint="knee")

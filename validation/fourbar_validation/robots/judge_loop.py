@@ -300,15 +300,14 @@ def _judge_vanishing(
 def list_answers(measured: LoopMeasurement) -> list[Answer]:
     """Return the answers at single states and through time, in the scene's axes."""
     states = measured.states
-    answers = [_make_answer(measured, states, FILE_AT_ONE_STATE, "as compiled")]
-    settings = measured.settings
-    setting = f"{settings.integrator} {settings.timestep:g} s"
     through = measured.through_time
+    answers = [_make_answer(measured, states, FILE_AT_ONE_STATE, "as compiled")]
+    simulated = (FILE_THROUGH_TIME, measured.setting)
     if through is not None:
         if len(through.rows):
-            answers.append(_make_answer(measured, through, FILE_THROUGH_TIME, setting))
+            answers.append(_make_answer(measured, through, *simulated))
     elif measured.moves:
-        answers.append(Answer(FILE_THROUGH_TIME, setting, refusal=measured.refusal))
+        answers.append(Answer(*simulated, refusal=measured.refusal))
     return answers
 
 

@@ -1,21 +1,13 @@
 """What MuJoCo says of a loop, as data: errors, sizes and changes of settings."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from pytest import approx
 
 from fourbar_validation.engines.mujoco.robots.answers import (
-    RobotSettings,
     divide,
     find_scales,
 )
-
-OWN = RobotSettings(
-    (0.02, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0), 0.002, "Euler", "Newton", 100, 1e-8
-)
-
 
 FORCES = {
     "F12": np.array([30.0, 3000.0]),
@@ -54,9 +46,3 @@ def test_an_error_is_over_its_scale():
     assert divide(1.0, 4.0) == 0.25
     assert divide(0.0, 0.0) == 0.0
     assert divide(1.0, 0.0) == divide(np.inf, 4.0) == np.inf
-
-
-def test_changes_are_written_as_attributes():
-    changed = replace(OWN, solref=(0.002, 1.0), integrator="RK4")
-    assert changed.list_changes(OWN) == {"solref": "0.002 1", "integrator": "RK4"}
-    assert OWN.list_changes(OWN) == {}

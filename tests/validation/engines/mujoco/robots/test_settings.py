@@ -17,8 +17,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.settings import (
     STIFFEST_IMPEDANCE,
     SettingsSearch,
-    _set_settings,
-    read_settings,
+    set_settings,
 )
 from fourbar_validation.places import MODELS
 from fourbar_validation.robots.files import read_robot
@@ -61,14 +60,18 @@ def paste(text, advice):
 
 
 def test_what_is_set_in_a_model_is_read_from_it():
+    """A search in the changed model has these settings for the file's own."""
     model, loop = find_loop(read_robot(FOOT))
-    own = read_settings(model, loop)
-    changes = {"integrator": "implicit", "timestep": 0.01, "iterations": 7}
-    changes |= {"solver": "CG", "tolerance": 1e-3, "solref": (0.1, 0.5)}
-    others = replace(own, solimp=STIFFEST_IMPEDANCE, **changes)
-    assert others.list_changes(own).keys() == {"solimp", *changes}
-    assert read_settings(_set_settings(model, loop, others), loop) == others
-    assert read_settings(model, loop) == own
+    changes = {"integrator": "implicit", "timestep": "0.01", "iterations": "7"}
+    changes |= {"solver": "CG", "tolerance": "0.001", "solref": "0.1 0.5"}
+    changes["solimp"] = STIFFEST_IMPEDANCE
+    motion = make_motion((loop.angles[1],), (2.0, 0.0))
+    own, others = (
+        SettingsSearch(LoopInside(one, loop), motion).own
+        for one in (model, set_settings(model, loop, changes))
+    )
+    assert others == own | changes
+    assert all(own[name] != changes[name] for name in changes)
 
 
 @pytest.mark.slow
@@ -76,10 +79,11 @@ def test_what_is_typed_reaches_the_error_that_was_wanted():
     file = read_robot(FOOT)
     advice = search(file).advise(2e-3, file)
     assert advice.reached and advice.best.error <= 2e-3 < advice.before.error
-    assert advice.before.settings.solref == (0.005, 1.0)
+    own = search(file).own
+    assert own["solref"] == "0.005 1"
     typed = search(replace(file, text=paste(file.text, advice)))
-    again = typed.measure(typed.own)
-    assert again.settings.list_changes(advice.best.settings) == {}
+    assert typed.own == own | advice.best.changes
+    again = typed.measure({})
     assert again.error == approx(advice.best.error, rel=1e-3)
 
 
@@ -138,7 +142,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
         return SettingsSearch(LoopInside(model, loop), motion)
 
     whole = search(0, 8)
-    stiff = replace(whole.own, solimp=STIFFEST_IMPEDANCE)
+    stiff = {"solimp": STIFFEST_IMPEDANCE}
     error = whole.measure(stiff).error
     assert error > 2.0 * wanted
     deciding = whole.measure(stiff).deciding

@@ -208,36 +208,11 @@ class TornState:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotSettings:
-    """Settings, by MJCF's names, of one loop's closures and of its robot's stepping."""
-
-    solref: tuple[float, ...]
-    solimp: tuple[float, ...]
-    timestep: float
-    integrator: str
-    solver: str
-    iterations: int
-    tolerance: float
-    solreffriction: tuple[float, ...] | None = None
-    """Of the loop's hinges with dry friction; None: as each has it in the file."""
-    solimpfriction: tuple[float, ...] | None = None
-
-    def list_changes(self, other: "RobotSettings") -> dict[str, str]:
-        """List the attributes in which this differs from another, as MJCF has them."""
-        return {
-            name: _write_attribute(getattr(self, name))
-            for name in self.__slots__
-            if getattr(self, name) != getattr(other, name)
-        }
-
-
-@dataclass(frozen=True, slots=True)
 class TriedSettings:
     """Settings and what they reach in the robot's file."""
 
-    settings: RobotSettings
-    changes: dict[str, str]
-    """Attributes that differ from the file's."""
+    changes: Mapping[str, str]
+    """Attributes of MJCF that differ from the file's, as they are typed."""
     states: WorstState
     """Worst single state."""
     through_time: WorstState
@@ -245,7 +220,10 @@ class TriedSettings:
     gap: float
     """Largest gap of the simulation, m."""
     seconds_per_step: float
-    """Processor time of a step of the whole robot, s."""
+    """Processor time of a step of the whole robot, s; infinite if it was not stepped.
+    """
+    cost: float
+    """Processor time of a simulated second, s."""
 
     @property
     def deciding(self) -> WorstState:
@@ -256,16 +234,6 @@ class TriedSettings:
     def error(self) -> float:
         """The greater of the two errors."""
         return self.deciding.error
-
-    @property
-    def is_simulated(self) -> bool:
-        """Tell whether any time was simulated."""
-        return math.isfinite(self.seconds_per_step)
-
-    @property
-    def cost(self) -> float:
-        """Processor time of a simulated second, s."""
-        return self.seconds_per_step / self.settings.timestep
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +299,8 @@ class LoopMeasurement:
     scene: Scene
     """Scene of the loop, in which the formulas are asked."""
     remarks: tuple[str, ...]
-    settings: RobotSettings
+    setting: str
+    """Integrator and timestep of the file."""
     rounding: float
     """Sum by which the lengths of the scene differ from the file's within its digits,
     m.
@@ -408,12 +377,3 @@ class RobotMeasurement:
 
     loops: tuple[LoopMeasurement, ...]
     notes: tuple[str, ...]
-
-
-def _write_attribute(value: object) -> str:
-    """Write a value as MJCF does."""
-    if isinstance(value, tuple):
-        return " ".join(f"{number:.6g}" for number in value)
-    if isinstance(value, str):
-        return value
-    return f"{value:.6g}"

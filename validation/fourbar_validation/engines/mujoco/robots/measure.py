@@ -34,6 +34,7 @@ from fourbar_validation.engines.mujoco.describe import (
     Described,
     describe_model,
     mend_entry,
+    word_of_number,
 )
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     describe_actuator,
@@ -75,10 +76,7 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     turn,
 )
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from fourbar_validation.engines.mujoco.robots.settings import (
-    SettingsSearch,
-    read_settings,
-)
+from fourbar_validation.engines.mujoco.robots.settings import SettingsSearch
 
 POSITIONS_OF_A_LOOP = 37
 """Positions at which a loop is looked at."""
@@ -215,12 +213,13 @@ def measure_loop(
         advice = search.advise(options.error, found.file)
     remarks += _describe_findings(inside, states, through)
     ties = (describe_equality(inside.model, one) for one in loop.other_equalities)
+    option = inside.model.opt
     return LoopMeasurement(
         loop.name,
         inside.name,
         found.scene,
         tuple(remarks),
-        read_settings(inside.model, loop),
+        f"{word_of_number('integrator', option.integrator)} {option.timestep:g} s",
         loop.rounding,
         len(inside.held),
         tuple(ties),

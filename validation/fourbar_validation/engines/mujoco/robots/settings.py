@@ -7,24 +7,29 @@ keeps the torque and the pin forces within the wanted error.
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections import ChainMap
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from copy import copy
-from dataclasses import replace
-from itertools import product
-from typing import Any
+from functools import partial
+from itertools import chain, compress, product
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
+from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
-from fourbar_validation.engines.mujoco.describe import number_of_word, word_of_number
+from fourbar_validation.engines.mujoco.describe import (
+    ENUMERATIONS,
+    STIFFEST,
+    number_of_word,
+    word_of_number,
+)
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
 from fourbar_validation.engines.mujoco.robots.answers import (
     InsideAnswer,
-    RobotSettings,
     SettingsAdvice,
     TriedSettings,
     WorstState,
@@ -40,7 +45,7 @@ within two minutes.
 """
 POSITIONS_OF_A_TRIAL = 9
 """Positions of a trial."""
-STIFFEST_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+STIFFEST_IMPEDANCE = "0.9999 0.9999 0.001 0.5 2"
 """The stiffest impedance: MuJoCo clamps it there."""
 _FASTER = (0.5, 0.2, 0.1, 0.05)
 """Factors on the closure's time constant."""
@@ -53,7 +58,7 @@ _EVALUATIONS = {"RK4": 4.0}
 """Evaluations of a step, for the order in which combinations are tried. The others have
 one.
 """
-SOLVER: dict[str, Any] = {"solver": "Newton", "iterations": 100, "tolerance": 1e-10}
+SOLVER = {"solver": "Newton", "iterations": "100", "tolerance": "1e-10"}
 """Solver, iterations and tolerance at which the solver leaves nothing."""
 RANGES_TRIED = 4
 """Ranges of the driven joint in which a combination is measured that is not within the
@@ -61,22 +66,9 @@ wanted error everywhere.
 """
 _FIRST_CONSTANT = 0.02
 """MuJoCo's own time constant, s, tried if the file states a stiffness in its place."""
+_OPTIONS = ("timestep", "integrator", *SOLVER)
 _OF_CLOSURES = ("solref", "solimp")
 _OF_FRICTION = ("solreffriction", "solimpfriction")
-
-
-def read_settings(model: mujoco.MjModel, loop: RobotLoop) -> RobotSettings:
-    """Read the settings of a compiled model."""
-    option = model.opt
-    return RobotSettings(
-        tuple(model.eq_solref[loop.equality].tolist()),
-        tuple(model.eq_solimp[loop.equality].tolist()),
-        float(option.timestep),
-        word_of_number("integrator", option.integrator),
-        word_of_number("solver", option.solver),
-        int(option.iterations),
-        float(option.tolerance),
-    )
 
 
 def _list_rubbing(model: mujoco.MjModel, loop: RobotLoop) -> list[int]:
@@ -87,30 +79,27 @@ def _list_rubbing(model: mujoco.MjModel, loop: RobotLoop) -> list[int]:
     return [dof for dof in dofs if model.dof_frictionloss[dof]]
 
 
-def _set_settings(
+def set_settings(
     model: mujoco.MjModel,
     loop: RobotLoop,
-    settings: RobotSettings,
+    changes: Mapping[str, str],
 ) -> mujoco.MjModel:
-    """Return a copy of a compiled model with other settings.
+    """Return a copy of a compiled model with other settings, by their attributes.
 
-    All closures of the loop get the same.
+    All closures of the loop get the same, and all its hinges with dry friction.
     """
     changed = copy(model)
-    closures = [*loop.closures]
-    rubbing = _list_rubbing(model, loop)
-    changed.eq_solref[closures] = settings.solref
-    changed.eq_solimp[closures] = settings.solimp
-    if settings.solreffriction is not None:
-        changed.dof_solref[rubbing] = settings.solreffriction
-    if settings.solimpfriction is not None:
-        changed.dof_solimp[rubbing] = settings.solimpfriction
-    option = changed.opt
-    option.integrator = number_of_word("integrator", settings.integrator)
-    option.solver = number_of_word("solver", settings.solver)
-    option.timestep = settings.timestep
-    option.iterations = settings.iterations
-    option.tolerance = settings.tolerance
+    for name, text in changes.items():
+        if name in _OF_CLOSURES:
+            getattr(changed, f"eq_{name}")[[*loop.closures]] = text.split()
+        elif name in _OF_FRICTION:
+            field = f"dof_{name.removesuffix('friction')}"
+            getattr(changed, field)[_list_rubbing(model, loop)] = text.split()
+        elif name in ENUMERATIONS:
+            setattr(changed.opt, name, number_of_word(name, text))
+        else:
+            kind = type(getattr(changed.opt, name))
+            setattr(changed.opt, name, kind(text))
     return changed
 
 
@@ -121,22 +110,39 @@ class SettingsSearch:
         self.inside = inside
         self.whole = motion
         self.motion = thin_out(motion, POSITIONS_OF_A_TRIAL)
-        self.own = read_settings(inside.given, inside.loop)
-        self.rubbing = _list_rubbing(inside.given, inside.loop)
-        self.tried: dict[RobotSettings, TriedSettings] = {}
+        model = inside.given
+        self.own = {
+            name: write_six_digits(*getattr(model, f"eq_{name}")[inside.loop.equality])
+            for name in _OF_CLOSURES
+        }
+        """Settings of the file."""
+        for name in _OPTIONS:
+            value = getattr(model.opt, name)
+            is_word = name in ENUMERATIONS
+            write = partial(word_of_number, name) if is_word else write_six_digits
+            self.own[name] = write(value)
+        looser = (
+            self.own["solver"] != SOLVER["solver"],
+            model.opt.iterations < int(SOLVER["iterations"]),
+            model.opt.tolerance > float(SOLVER["tolerance"]),
+        )
+        self.solver = dict(compress(SOLVER.items(), looser))
+        """Settings of the solver that leave less than the file's."""
+        self.rubbing = _list_rubbing(model, inside.loop)
+        self.tried: dict[frozenset[tuple[str, str]], TriedSettings] = {}
         self.end = time.process_time() + SEARCH_SECONDS * share
 
     def advise(self, wanted: float, file: RobotFile) -> SettingsAdvice:
         """Find the cheapest combination within an error."""
-        before = self.measure(self.own)
-        alone = sorted(map(self.measure, self._list_alone()), key=lambda one: one.error)
+        before = self.measure({})
+        solver = [{name: value} for name, value in self.solver.items()]
+        singles = chain(*self._list_choices(), solver)
+        alone = sorted(map(self.measure, singles), key=lambda one: one.error)
         best = self._find_cheapest(wanted)
         tried = len(self.tried)
         within = None
         if best.error > wanted:
-            within = self.find_range(best.settings, wanted)
-        model = self.inside.given
-        joints = model.dof_jntid[self.rubbing].tolist()
+            within = self.find_range(best.changes, wanted)
         return SettingsAdvice(
             wanted,
             len(self.motion),
@@ -144,12 +150,12 @@ class SettingsSearch:
             tuple(alone),
             best,
             tried,
-            _write_elements(file, self.inside.loop, best, model, joints),
+            tuple(self._write_elements(file, best.changes)),
             within,
         )
 
     def _answer(
-        self, settings: RobotSettings, motion: Array, wanted: float = math.inf
+        self, changes: Mapping[str, str], motion: Array, wanted: float = math.inf
     ) -> list[InsideAnswer]:
         """Return the answers at single states and through time.
 
@@ -158,7 +164,7 @@ class SettingsSearch:
         are not within an error.
         """
         given = self.inside
-        inside = given.with_model(_set_settings(given.given, given.loop, settings))
+        inside = given.with_model(set_settings(given.given, given.loop, changes))
         answers = []
         with suppress(LimitError):
             states = inside.answer_states(motion)
@@ -168,14 +174,14 @@ class SettingsSearch:
         return answers
 
     def find_range(
-        self, settings: RobotSettings, wanted: float
+        self, changes: Mapping[str, str], wanted: float
     ) -> tuple[float, float] | None:
         """Return the widest range of the driven joint found within an error, rad.
 
         Ranges are proposed by the states of the whole motion, each error over the
         scale of its range, and then measured by themselves.
         """
-        answers = self._answer(settings, self.whole)
+        answers = self._answer(changes, self.whole)
         if len(answers) < 2 or answers[1].lost:
             return None
         places = np.unique(answers[0].rows.angle).tolist()
@@ -200,25 +206,27 @@ class SettingsSearch:
             tried += 1
             motion = make_motion(inside, self.whole[0, 1:])
             search = SettingsSearch(self.inside, motion)
-            if search.measure(settings).error <= wanted:
+            if search.measure(changes).error <= wanted:
                 at_ends = np.isin(states.rows.angle, (low, high))
                 ends = states.rows.joint[at_ends].tolist()
                 return min(ends), max(ends)
         return None
 
     def measure(
-        self, settings: RobotSettings, wanted: float = math.inf
+        self, changes: Mapping[str, str], wanted: float = math.inf
     ) -> TriedSettings:
         """Measure what settings reach.
 
         They are not simulated where their single states are not within an error.
         """
-        known = self.tried.get(settings)
-        if known is not None and (known.is_simulated or known.states.error > wanted):
+        known = self.tried.get(frozenset(changes.items()))
+        if known is not None and (
+            math.isfinite(known.seconds_per_step) or known.states.error > wanted
+        ):
             return known
         states = through = WorstState(math.inf)
         gap = seconds = math.inf
-        answers = self._answer(settings, self.motion, wanted)
+        answers = self._answer(changes, self.motion, wanted)
         if answers:
             scales = answers[0].scales(self.inside.lever)
             states = answers[0].find_worst(scales)
@@ -227,131 +235,109 @@ class SettingsSearch:
             through = answer.find_worst(scales)
             seconds = answer.seconds_per_step
             gap = float(answer.rows.gap.max()) if len(answer.rows) else math.inf
-        changes = settings.list_changes(self.own)
-        measured = TriedSettings(settings, changes, states, through, gap, seconds)
-        self.tried[settings] = measured
+        cost = seconds / float({**self.own, **changes}["timestep"])
+        measured = TriedSettings(changes, states, through, gap, seconds, cost)
+        self.tried[frozenset(changes.items())] = measured
         return measured
 
-    def _list_alone(self) -> Iterator[RobotSettings]:
-        """List each setting changed by itself."""
-        own = self.own
-        for name, values in self._list_values().items():
-            for value in values[1:]:
-                yield replace(own, **{name: value})
-        if own.solver != SOLVER["solver"]:
-            yield replace(own, solver=SOLVER["solver"])
-        if own.iterations < SOLVER["iterations"]:
-            yield replace(own, iterations=SOLVER["iterations"])
-        if own.tolerance > SOLVER["tolerance"]:
-            yield replace(own, tolerance=SOLVER["tolerance"])
-
-    def _list_values(self) -> dict[str, list[Any]]:
-        """Return the values of each setting that are combined, the file's own first."""
-        own = self.own
-        constant, ratio = own.solref
+    def _list_choices(self) -> list[list[dict[str, str]]]:
+        """List the changes of each setting that are combined with those of others."""
+        model = self.inside.given
+        constant, ratio = model.eq_solref[self.inside.loop.equality].tolist()
         if constant <= 0.0:
             constant = _FIRST_CONSTANT
             ratio = 1.0
-        shortest = FEWEST_TIMESTEPS * own.timestep
+        finer = [factor * model.opt.timestep for factor in _FINER]
+        shortest = FEWEST_TIMESTEPS * model.opt.timestep
         constants = {max(factor * constant, shortest) for factor in _FASTER}
         faster = sorted((one for one in constants if one < constant), reverse=True)
-        model = self.inside.given
         soft = model.dof_solref[self.rubbing, 0] > shortest
-        yielding = model.dof_solimp[self.rubbing, 1] < STIFFEST_IMPEDANCE[1]
-        further: dict[str, list[Any]] = {
+        yielding = model.dof_solimp[self.rubbing, 1] < STIFFEST
+        further = {
             "solimp": [STIFFEST_IMPEDANCE],
-            "solref": [(one, ratio) for one in faster],
+            "solref": [write_six_digits(one, ratio) for one in faster],
             "integrator": [*INTEGRATORS_TRIED],
-            "timestep": [factor * own.timestep for factor in _FINER],
-            "solreffriction": [(shortest, 1.0)] * bool(soft.any()),
+            "timestep": [*map(write_six_digits, finer)],
+            "solreffriction": [write_six_digits(shortest, 1.0)] * bool(soft.any()),
             "solimpfriction": [STIFFEST_IMPEDANCE] * bool(yielding.any()),
         }
-        return {
-            name: [*dict.fromkeys((getattr(own, name), *values))]
+        return [
+            [{name: value} for value in values if value != self.own.get(name)]
             for name, values in further.items()
-        }
+        ]
 
     def _find_cheapest(self, wanted: float) -> TriedSettings:
         """Try combinations until one serves, first the cheapest with fewest changes.
 
         If none serves in time, the most accurate one is returned.
         """
-        values = self._list_values()
-        solvers: list[dict[str, Any]] = [{}]
-        tight = self.measure(replace(self.own, **SOLVER))
-        if tight.error < 0.9 * self.measure(self.own).error:
-            solvers.append(SOLVER)
+        choices = [*self._list_choices()]
+        if self.measure(self.solver).error < 0.9 * self.measure({}).error:
+            choices.append([self.solver])
         combinations = [
-            replace(self.own, **dict(zip(values, chosen, strict=True)), **solver)
-            for *chosen, solver in product(*values.values(), solvers)
+            dict(ChainMap(*chosen))
+            for chosen in product(*([{}, *changes] for changes in choices))
         ]
         combinations.sort(key=self._rank)
-        for settings in combinations:
+        for changes in combinations:
             if time.process_time() > self.end:
                 break
-            measured = self.measure(settings, wanted)
+            measured = self.measure(changes, wanted)
             if measured.error <= wanted:
                 return measured
         best = min(self.tried.values(), key=lambda one: one.error)
         for one in sorted(self.tried.values(), key=lambda one: one.states.error):
             if one.states.error >= best.error:
                 break
-            best = min(best, self.measure(one.settings), key=lambda one: one.error)
+            best = min(best, self.measure(one.changes), key=lambda one: one.error)
         return best
 
-    def _rank(self, settings: RobotSettings) -> tuple[float, int, float]:
+    def _rank(self, changes: Mapping[str, str]) -> tuple[float, int, float]:
         """Return the key by which combinations are sorted.
 
         Evaluations per simulated second come first, then changes, then stiffness.
         """
-        evaluations = _EVALUATIONS.get(settings.integrator, 1.0) / settings.timestep
-        changes = settings.list_changes(self.own)
-        return evaluations, len(changes), -settings.solref[0]
+        settings = {**self.own, **changes}
+        evaluations = _EVALUATIONS.get(settings["integrator"], 1.0)
+        constant, _ = settings["solref"].split()
+        return evaluations / float(settings["timestep"]), len(changes), -float(constant)
 
-
-def _write_elements(
-    file: RobotFile,
-    loop: RobotLoop,
-    tried: TriedSettings,
-    model: mujoco.MjModel,
-    rubbing: Sequence[int],
-) -> tuple[str, ...]:
-    """Return the elements of the file that are to be changed, with their new values.
-
-    `rubbing`: hinges with dry friction.
-    """
-
-    def write(tag: str, attributes: dict[str, str]) -> str:
-        return ET.tostring(ET.Element(tag, attributes), encoding="unicode")
-
-    option = dict(tried.changes)
-    closure, friction = (
-        {name: option.pop(name) for name in names if name in option}
-        for names in (_OF_CLOSURES, _OF_FRICTION)
-    )
-    written = []
-    if option:
-        written.append(write("option", option))
-    root = ET.fromstring(file.text)
-    elements = root.findall(".//equality/*")
-    equalities = [one for one in elements if one.tag != "equality"]
-    for number in loop.closures if closure else ():
-        # that of a URDF is no element of it
-        one = (
-            equalities[number] if equalities else ET.Element("connect", name=loop.name)
+    def _write_elements(
+        self, file: RobotFile, changes: Mapping[str, str]
+    ) -> Iterator[str]:
+        """Write the elements of the file that change, with their new values."""
+        loop = self.inside.loop
+        model = self.inside.given
+        closure, friction = (
+            {name: changes[name] for name in names if name in changes}
+            for names in (_OF_CLOSURES, _OF_FRICTION)
         )
-        written.append(write(one.tag, one.attrib | closure))
-    joints = [
-        one.attrib
-        for one in root.findall(".//worldbody//*")
-        if one.tag in ("joint", "freejoint")
-    ]
-    stated = {attributes.get("name", ""): attributes for attributes in joints}
-    in_order = [attributes.get("name", "") for attributes in joints] == [
-        model.joint(number).name for number in range(model.njnt)
-    ]
-    for number in rubbing if friction else ():
-        name = name_joint(model, number)
-        own = joints[number] if in_order else stated.get(name, {"name": name})
-        written.append(write("joint", own | friction))
-    return tuple(written)
+        option = {name: changes[name] for name in _OPTIONS if name in changes}
+        written: list[tuple[str, dict[str, str], dict[str, str]]]
+        written = [("option", {}, option)]
+        root = ET.fromstring(file.text)
+        elements = root.findall(".//equality/*")
+        equalities = [one for one in elements if one.tag != "equality"]
+        for number in loop.closures:
+            # that of a URDF is no element of it
+            one = ET.Element("connect", name=loop.name)
+            if equalities:
+                one = equalities[number]
+            written.append((one.tag, one.attrib, closure))
+        joints = [
+            one.attrib
+            for one in root.findall(".//worldbody//*")
+            if one.tag in ("joint", "freejoint")
+        ]
+        stated = {attributes.get("name", ""): attributes for attributes in joints}
+        in_order = [attributes.get("name", "") for attributes in joints] == [
+            model.joint(number).name for number in range(model.njnt)
+        ]
+        for number in model.dof_jntid[self.rubbing].tolist():
+            name = name_joint(model, number)
+            own = joints[number] if in_order else stated.get(name, {"name": name})
+            written.append(("joint", own, friction))
+        for tag, own, changed in written:
+            if changed:
+                element = ET.Element(tag, own | changed)
+                yield ET.tostring(element, encoding="unicode")
