@@ -102,8 +102,8 @@ def measure_mimic(
     Parameters
     ----------
     assets : a further folder in which includes and meshes are looked for.
-    angles : angles of bars in the rest pose of the file, "theta_2" to "theta_4", with
-        units. They win over what the file tells.
+    angles : "theta_2" in the rest pose of the file, with a unit. It wins over what the
+        file tells.
 
     Raises
     ------
@@ -111,15 +111,18 @@ def measure_mimic(
         over the motion.
     """
     file = read_robot(path, assets)
-    theta = {
-        name: require(f"--pose {name}", text, "rad")
-        for name, text in (angles or {}).items()
-    }
+    stated = None
+    for name, text in (angles or {}).items():
+        if name != "theta_2":
+            raise InputError(
+                "--pose",
+                name,
+                "must be theta_2 beside --mimic, the angle of bar 2 in the rest pose of"
+                " the file",
+            )
+        stated = require(f"--pose {name}", text, "rad")
     with examine_guarded(file) as examined:
-        equality: JointEquality = examined(
-            READ, file, joint, scene, theta.get("theta_2")
-        )
-    equality = _state_angles(equality, theta)
+        equality: JointEquality = examined(READ, file, joint, scene, stated)
     positions = _place_leader(scene, equality)
     low, high = positions[[0, -1]].tolist()
     branch = int(command(scene).branch[0])
@@ -131,12 +134,11 @@ def measure_mimic(
         middle = 0.5 * (low + high)
         rest = middle + math.remainder(equality.theta_2 - middle, math.tau)
         x = equality.side * (theta_2 - rest)
-        if theta.keys() <= {"theta_2"}:
-            with suppress(InputError):  # the loop is open there
-                (in_loop,), _ = _follow(scene, np.array([rest]), branch, equality)
-                if is_same_angle(in_loop, zeros[0]):
-                    zeros.clear()
-                zeros.append(float(in_loop))
+        with suppress(InputError):  # the loop is open there
+            (in_loop,), _ = _follow(scene, np.array([rest]), branch, equality)
+            if is_same_angle(in_loop, zeros[0]):
+                zeros.clear()
+            zeros.append(float(in_loop))
     # both joints in their own senses
     side = equality.side * equality.sense
     turned = side * angle
@@ -207,39 +209,6 @@ def _place_leader(scene: Scene, equality: JointEquality) -> Array:
             " a ratio is of a motion",
         )
     return positions
-
-
-def _state_angles(
-    equality: JointEquality, angles: Mapping[str, float]
-) -> JointEquality:
-    """Return an equality with its follower where angles state it, if they do.
-
-    Raises
-    ------
-    InputError : an angle of a bar that the equality does not turn, or only one of two
-        that tell where the follower is.
-    """
-    of_follower = (f"theta_{bar}" for bar in sorted(equality.bars) if bar > 2)
-    allowed = ["theta_2", *of_follower]
-    theta = {1: 0.0}
-    if not math.isnan(equality.theta_2):
-        theta[2] = equality.theta_2
-    for name, angle in angles.items():
-        if name not in allowed:
-            raise InputError(
-                "--pose",
-                name,
-                f"must be {' or '.join(allowed)} beside --mimic, the angle of a bar in"
-                " the rest pose of the file",
-            )
-        theta[int(name[-1])] = angle
-    if angles.keys() <= {"theta_2"}:
-        return equality
-    for name in allowed:
-        if int(name[-1]) not in theta:
-            raise InputError(f"--pose {name}", None, "is needed beside the other angle")
-    turned, bearer = (theta[bar] for bar in equality.bars)
-    return replace(equality, follower_zero=turned - bearer)
 
 
 def _drop_turns(angles: Array) -> Array:
@@ -426,11 +395,9 @@ def _write_errors(report: _MimicReport) -> str:
             f" {_deg(math.remainder(zero, math.tau))} deg; "
         )
     elif not math.isnan(equality.theta_2):
-        bars = sorted(bar for bar in equality.bars if bar > 2)
-        stated = ",".join(f"theta_{bar}=ANGLE" for bar in bars)
         missing = (
             "; the loop does not close at the zero of the file, which does not tell"
-            f" {angle} there: --pose {stated} states it"
+            f" {angle} there"
         )
     return (
         f"largest error of the angle: {through_zero}"
