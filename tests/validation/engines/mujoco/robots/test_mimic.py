@@ -45,7 +45,6 @@ TENDONS = """<mujoco><worldbody>
 </fixed>
 <fixed name="first"><joint joint="follow" coef="0.5"/></fixed>
 <fixed name="second"><joint joint="lead" coef="-1.5"/></fixed>
-<fixed name="none"><joint joint="follow" coef="0"/></fixed>
 <fixed name="half"><joint joint="lead" coef="1"/>
 <joint joint="follow" coef="0"/></fixed>
 </tendon><equality>{}</equality></mujoco>"""
@@ -58,10 +57,9 @@ EXACT = 1e-13
     read_rows("""
 <tendon tendon1="both"/> | lead follow
 <tendon tendon1="both" polycoef="0.3 1 0 0 0"/> | lead follow
-<tendon tendon1="first" tendon2="second" polycoef=".1 .2 .3 .4 .5"/> | follow
+<tendon tendon1="first" tendon2="second" polycoef=".1 .2 .3 .4 .5"/> |
 <joint joint1="follow" joint2="lead" polycoef=".1 2 3 4 5"/> | follow
 <tendon tendon1="both" tendon2="second"/> |
-<tendon tendon1="none" tendon2="second"/> |
 <tendon tendon1="half"/> |
 <tendon tendon1="first"/> |
 <joint joint1="follow"/> |

@@ -1,7 +1,7 @@
 """Bodies of a model, the joints between them, and what acts on them."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import mujoco
@@ -116,40 +116,27 @@ class Follower(NamedTuple):
 
 
 def list_followers(model: mujoco.MjModel, equality: int) -> list[Follower]:
-    """List the joints that an equality of joints or fixed tendons lets follow others.
+    """List the joints that an equality of joints or a fixed tendon lets follow others.
 
     A tendon over two joints that is kept at a length, c1 q1 + c2 q2 = a0, lets each of
-    them follow the other. Of two tendons over a joint each the first one follows. By an
-    equality that is switched off none follows.
+    them follow the other. By an equality that is switched off none follows.
     """
     kind = model.eq_type[equality]
-    tied = find_tied_bodies(model, equality)
+    first, second = find_tied_bodies(model, equality)
     powers = model.eq_data[equality, :5].tolist()
-    if kind == mujoco.mjtEq.mjEQ_JOINT:
-        ends, leaders = ({joint: 1.0} if joint >= 0 else {} for joint in tied)
-    elif kind == mujoco.mjtEq.mjEQ_TENDON:
-        ends, leaders = (list_tendon_joints(model, one) for one in tied)
-    else:
+    if not model.eq_active0[equality]:
         return []
-    if not all(ends.values()) or not model.eq_active0[equality]:
+    if kind == mujoco.mjtEq.mjEQ_JOINT and second >= 0:
+        return [Follower(first, second, tuple(powers))]
+    if kind != mujoco.mjtEq.mjEQ_TENDON or second >= 0:
         return []
-    if tied[1] < 0 and len(ends) == 2:
-        pairs = zip(ends.items(), reversed(ends.items()), strict=True)
-        return [
-            Follower(joint, leader, (powers[0] / factor, -other / factor, 0, 0, 0))
-            for (joint, factor), (leader, other) in pairs
-        ]
-    followers = [
-        Follower(
-            joint,
-            leader,
-            tuple(power * other**k / factor for k, power in enumerate(powers)),
-        )
-        for joint, factor in ends.items()
-        for leader, other in leaders.items()
-        if joint != leader
+    joints = list_tendon_joints(model, first)
+    if len(joints) != 2 or not all(joints.values()):
+        return []
+    return [
+        Follower(joint, leader, (powers[0] / factor, -other / factor, 0, 0, 0))
+        for (joint, factor), (leader, other) in permutations(joints.items())
     ]
-    return followers if len(ends) == len(leaders) == 1 else []
 
 
 def list_wraps(

@@ -14,15 +14,16 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled
+from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_body
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 
 _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
 _LARGEST_NUMBER = 1e100
 """m, kg or kg m^2 whose square is a double."""
-_FROM_GEOMS, _AS_STATED = 1, 0
-"""Values of the compiler's `inertiafromgeom`: all bodies, and none; 2 is in between."""
+_OTHER_SCALE = 1e3
+"""Scale at which what stands in for a mesh gives every body that has it another mass.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +78,14 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
                 f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
             )
         _add_loop_joints(spec, file)
-        unknown = _name_unknown(spec, file)
-        for pair in [*spec.pairs] if file.missing else ():
-            spec.delete(pair)  # it may name what stands in for a mesh
+        _part_stand_ins(spec, file)
         quaternions = {
             number: tuple(body.quat.tolist())
             for number, body in enumerate(spec.bodies)
             if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
         }
         model = spec.compile()
+        masses = _list_unknown_masses(spec, file, model)
     except ValueError as error:
         # its lines are those of a text that is written anew, and not of the file
         stated = re.sub(r", line \d+", "", str(error))
@@ -109,11 +109,6 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         largest = float(np.abs(getattr(model, name)).max(initial=0.0))
         if not largest < _LARGEST_NUMBER:
             raise InputError("MJCF", None, f"{name} of {largest:g} is out of range")
-    masses = tuple(
-        number
-        for number in range(model.nbody)
-        if model.body(number).name in unknown and model.body_weldid[number]
-    )
     notes = list(file.notes)
     if left_out := {*file.missing.values()}:
         notes.append(
@@ -121,7 +116,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             f"{min(left_out)}"
         )
     if masses:
-        names = ", ".join(model.body(number).name for number in masses)
+        names = ", ".join(name_body(model, number) for number in masses)
         notes.append(
             f"the masses of {names} are unknown: their meshes are missing and no "
             "inertial is stated; --assets DIR says where the meshes are"
@@ -139,17 +134,15 @@ def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
     """
     model = robot.model
     unknown = [number for number in robot.unknown_masses if number in bodies]
-    parts = [model.body(number).name for number in unknown]
-    unknown = [number for number in unknown if model.body_jntnum[number]]
-    if unknown:
-        name = robot.model.body(unknown[0]).name
-        raise InputError(
-            "MJCF",
-            name,
-            "states no inertial and its mesh is missing: its mass is unknown; "
-            "--assets DIR says where the meshes are",
-        )
-    return parts
+    for number in unknown:
+        if model.body_jntnum[number]:
+            raise InputError(
+                "MJCF",
+                name_body(model, number),
+                "states no inertial and its mesh is missing: its mass is unknown; "
+                "--assets DIR says where the meshes are",
+            )
+    return [name_body(model, number) for number in unknown]
 
 
 def _add_loop_joints(spec: mujoco.MjSpec, file: RobotFile) -> None:
@@ -166,32 +159,27 @@ def _add_loop_joints(spec: mujoco.MjSpec, file: RobotFile) -> None:
             setattr(closure, f"name{number}", site)
 
 
-def _name_unknown(spec: mujoco.MjSpec, file: RobotFile) -> set[str]:
-    """Return the names of the bodies whose mass missing meshes would give.
-
-    What stands in for such a mesh touches nothing.
-    """
-    unknown = set()
-    for number, body in enumerate(spec.bodies):
-        geoms = [geom for geom in body.geoms if geom.meshname in file.missing]
-        for geom in geoms:
+def _part_stand_ins(spec: mujoco.MjSpec, file: RobotFile) -> None:
+    """Let what stands in for a missing mesh touch nothing."""
+    for geom in spec.geoms:
+        if geom.meshname in file.missing:
             geom.contype = geom.conaffinity = 0
-        if geoms and _needs_geoms(spec, body, geoms):
-            body.name = body.name or f"body_{number}"
-            unknown.add(body.name)
-    return unknown
+    for pair in [*spec.pairs] if file.missing else ():
+        spec.delete(pair)  # it may name what stands in
 
 
-def _needs_geoms(
-    spec: mujoco.MjSpec,
-    body: mujoco.MjsBody,
-    geoms: list[mujoco.MjsGeom],
-) -> bool:
-    """Tell whether the inertia of a body follows from these geoms."""
-    rule = spec.compiler.inertiafromgeom
-    if body.name == "world" or rule == _AS_STATED:
-        return False
-    if body.explicitinertial and rule != _FROM_GEOMS:
-        return False
-    lowest, highest = spec.compiler.inertiagrouprange
-    return any(geom.mass != 0.0 and lowest <= geom.group <= highest for geom in geoms)
+def _list_unknown_masses(
+    spec: mujoco.MjSpec, file: RobotFile, model: mujoco.MjModel
+) -> tuple[int, ...]:
+    """List the bodies that move and whose mass or inertia missing meshes would give.
+
+    They have others where what stands in for a mesh has another size.
+    """
+    if not file.missing:
+        return ()
+    for mesh in spec.meshes:
+        if mesh.name in file.missing:
+            mesh.scale *= _OTHER_SCALE
+    changed = (spec.compile().body_inertia != model.body_inertia).any(axis=1)
+    bodies: list[int] = np.flatnonzero(changed & (model.body_weldid != 0)).tolist()
+    return tuple(bodies)

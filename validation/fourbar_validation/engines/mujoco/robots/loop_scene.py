@@ -8,11 +8,10 @@ import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import groupby
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from scipy import ndimage
 
 from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
 from fourbar.errors import InputError
@@ -50,11 +49,11 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
 from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
-    FLAT,
     LoopScene,
     PoseOptions,
     RobotFile,
     RobotLoop,
+    is_in_line,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     OUTSIDE_A_RANGE,
@@ -297,6 +296,7 @@ class SceneOfLoop(SeenLoop):
         start, stop = (_round_angle(end + self.shift) for end in ends)
         theta_2 = Sweep(start, stop, SWEEP_INTERVALS) if stop > start else start
         branch = self._find_branch(linkage, self.loop.angles[1] + self.shift)
+        self._remark_assembly(branch)
         motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, at_start))
         self._remark_what_is_left_out(lumps)
@@ -420,11 +420,10 @@ class SceneOfLoop(SeenLoop):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
         near = min(max(theta_2, low), high)
-        senses = [
-            np.linspace(near, end, RANGE_INTERVALS + 1)
-            for end in (max(low, near - math.tau), min(high, near + math.tau))
-        ]
-        angles = np.unique([*senses, np.full_like(senses[0], theta_2)])
+        low = max(low, near - math.tau)
+        high = min(high, near + math.tau)
+        both_ways = np.linspace([low, high], near, RANGE_INTERVALS + 1)
+        angles = np.union1d(both_ways, theta_2)
         in_pose = int(np.searchsorted(angles, theta_2))
         betas = self._follow(linkage, angles, in_pose)
         free = (angles >= low) & (angles <= high)
@@ -438,8 +437,9 @@ class SceneOfLoop(SeenLoop):
                 self.loop.name,
                 "no position is within the ranges of its hinges",
             )
-        first, last = _find_run(free, in_pose)
-        low, high = angles[[first, last]].tolist()
+        runs, _ = ndimage.label(free)
+        nearest = min(np.flatnonzero(free), key=lambda place: abs(place - in_pose))
+        low, high = angles[runs == runs[nearest]][[0, -1]].tolist()
         start = max(low, min(near, high - math.tau))
         stop = min(high, start + math.tau)
         at_start = {
@@ -457,49 +457,46 @@ class SceneOfLoop(SeenLoop):
 
         Continuous angles are counted from those of the loop in its pose.
         """
-        branch = self._find_branch(linkage, self.loop.angles[1])
+        loop = self.loop
+        branch = self._find_branch(linkage, loop.angles[1])
         solution = solve(Scene(linkage, Motion(angles, branch=branch)), "position")
         ground = np.full_like(angles, linkage.ground_angle)
-        thetas = [ground, angles, solution.theta_3, solution.theta_4]
-        betas = {}
-        for pin in self.loop.hinges:
-            first, second = (bar - 1 for bar in PINS[pin])
-            beta = np.asarray(thetas[second]) - np.asarray(thetas[first])
-            drawn = self.loop.angles[second] - self.loop.angles[first]
-            turns = round((drawn - float(beta[in_pose])) / math.tau)
-            betas[pin] = beta + math.tau * turns
-        return betas
+        thetas = np.array([ground, angles, solution.theta_3, solution.theta_4])
+        turns = np.round((loop.angles - thetas[:, in_pose]) / math.tau)
+        thetas += math.tau * turns[:, None]
+        return {
+            pin: thetas[second - 1] - thetas[first - 1]
+            for pin, (first, second) in PINS.items()
+            if pin in loop.hinges
+        }
 
     def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
         """Return the branch whose output stands as in the pose.
 
         `theta_2`: that of the pose, counted in the turns of the sweep.
         """
-        _, _, theta_3, theta_4 = self.loop.angles
-        angles = (linkage.ground_angle, theta_2, theta_3, theta_4)
-        missed, missed_crossed = (
-            miss_output(Scene(linkage, Motion(theta_2, branch=branch)), angles)
-            for branch in (OPEN, CROSSED)
-        )
-        if not abs(missed - missed_crossed) > FLAT:
-            text = "coupler and output are in line in this pose: open is taken"
-            self._remark(f"{text}; --pose states another")
+        if is_in_line(self.loop.angles, 2):
             return OPEN
-        branch = OPEN if missed < missed_crossed else CROSSED
-        if self.loop.is_flat(2):
-            text = (
-                "coupler and output are in line in the pose before closing, which does"
-                f" not tell the assembly: it closed to the {BRANCH_NAMES[branch]} one"
-            )
-            reflected = reflect(self.model, self.loop)
-            if pose := write_pose(self.model, self.loop, reflected):
-                text += f"; --pose {pose} closes to the other"
-            self._remark(text)
-        return branch
+        _, _, theta_3, theta_4 = self.loop.angles
+        sign = OPEN if math.sin(theta_4 - theta_3) > 0.0 else CROSSED
+        return int(find_signs(linkage, np.array([theta_2]), sign)[0])
 
-    def _remark(self, text: str) -> None:
-        if text not in self.remarks:
-            self.remarks.append(text)
+    def _remark_assembly(self, branch: int) -> None:
+        """Say where the pose does not tell the assembly."""
+        loop = self.loop
+        text = "coupler and output are in line in"
+        if is_in_line(loop.angles, 2):
+            text += " this pose: open is taken; --pose states another"
+        elif loop.is_flat(2):
+            text += (
+                " the pose before closing, which does not tell the assembly: it closed"
+                f" to the {BRANCH_NAMES[branch]} one"
+            )
+            if pose := write_pose(self.model, loop, reflect(self.model, loop)):
+                text += f"; --pose {pose} closes to the other"
+        else:
+            return
+        self.remarks.append(text)
 
     def _remark_what_is_left_out(self, lumps: dict[int, Lump]) -> None:
         """Name what acts on the loop and is not in the scene."""
@@ -570,14 +567,6 @@ class SceneOfLoop(SeenLoop):
                 or (pulls and self.touches_tendon(target))
             ):
                 self._leave_out(describe_actuator(model, number))
-
-
-def _find_run(free: NDArray[np.bool_], near: int) -> tuple[int, int]:
-    """Return the ends of the run of True that is nearest to an index."""
-    runs = groupby(range(len(free)), key=lambda index: bool(free[index]))
-    of_true = [[*run] for is_free, run in runs if is_free]
-    nearest = min(of_true, key=lambda run: min(abs(index - near) for index in run))
-    return nearest[0], nearest[-1]
 
 
 def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
