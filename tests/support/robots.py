@@ -13,7 +13,6 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     find_closures,
     list_closures,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import (
@@ -252,13 +251,10 @@ def report_of(file, **pose):
 
 
 def pose_loop(file, name=None, **pose):
-    """Return a robot, its pose, and its loop of this name or the first one."""
-    options = PoseOptions(**pose)
-    robot = compile_robot(file_of(file))
-    posed = pose_robot(robot.model, options)
-    found = find_closures(posed, options)
-    loop = next(one.loop for one in found if one.loop and name in (None, one.name))
-    return robot, posed, loop
+    """Return a robot in its pose, and its loop of this name or the first one."""
+    posed = pose_robot(file_of(file), PoseOptions(**pose))
+    found = find_closures(posed, name)
+    return posed, next(one.loop for one in found if one.loop)
 
 
 def read_scene(text, loop=None, speed=3.0, **pose):

@@ -13,13 +13,15 @@ import pytest
 from pytest import approx, raises
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.closures import choose_loop, require_loops
+from fourbar_validation.engines.mujoco.robots.closures import find_loops
 from tests.support.robots import (
     ADAPTIVE,
     EXCAVATOR,
     TILT,
     Planar,
     forward,
+    pose_loop,
+    read_scene,
     report_of,
     rotation,
 )
@@ -301,7 +303,8 @@ def test_two_connects_along_one_axis_are_one_pin():
     assert (one.name, other.name) == ("coupler-output-1", "coupler-output-2")
     assert one.loop.closures == (0, 1)
     assert other.loop is not None
-    (loop,) = require_loops(report.closures)
+    posed, _ = pose_loop(text)
+    (loop,) = find_loops(posed, None)
     assert loop.name == one.name
     said = f"{other.name} holds the same pin, and acts with {one.name}"
     assert loop.remarks == (said,)
@@ -423,17 +426,18 @@ def test_without_a_motor_the_first_hinge_of_the_ground_is_driven():
 
 
 def test_a_loop_is_chosen_by_its_name():
-    closures = report_of(Planar().text()).closures
-    assert choose_loop(closures, "coupler-output") is closures[0].loop
+    posed, loop = pose_loop(Planar().text())
+    (chosen,) = find_loops(posed, "coupler-output")
+    assert chosen.name == loop.name == "coupler-output"
     with raises(InputError, match="the file has: coupler-output"):
-        choose_loop(closures, "knee")
-    spatial = report_of(replace(Planar(), axes={"A": "0 1 1"}).text()).closures
-    with raises(InputError, match="is no four-bar: the axes"):
-        choose_loop(spatial, "coupler-output")
-    with raises(InputError, match="coupler-output: the axes"):
-        require_loops(spatial)
+        find_loops(posed, "knee")
+    skew = replace(Planar(), axes={"A": "0 1 1"}).text()
+    for name in ("coupler-output", None):
+        with raises(InputError, match="four-bar: coupler-output: the axes"):
+            read_scene(skew, name)
+    again = '<connect body1="coupler" body2="output" anchor="0 0 0"/></equality>'
     with raises(InputError, match="loops says why of its 2 equalities"):
-        require_loops(spatial * 2)
+        read_scene(skew.replace("</equality>", again))
 
 
 TWO_LOOPS = """

@@ -174,7 +174,7 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
 
 def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     """The bars are in line there, and leave a gap of what a + d = b + c misses by."""
-    _, posed, _ = pose_loop(LARGE)
+    posed, _ = pose_loop(LARGE)
     loop = read_scene(LARGE).loop
     in_line = 0.5 * math.pi
     ground, crank, coupler, output = loop.lengths

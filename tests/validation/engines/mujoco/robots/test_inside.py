@@ -105,7 +105,7 @@ RIGID = 1e-8
 def open_loop(name):
     file, closing, pose = WHOLE[name]
     parts = pose_loop(file, closing, **pose)
-    _, posed, loop = parts
+    posed, loop = parts
     return LoopInside(posed.model, loop), make_loop_scene(*parts, 2.0)
 
 
@@ -262,7 +262,7 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     branch, bar, drawn, turned
 ):
     """The open one is the parallelogram, and the other its mirror image."""
-    _, posed, loop = pose_loop(draw_knee(drawn))
+    posed, loop = pose_loop(draw_knee(drawn))
     inside = LoopInside(posed.model, loop, bar=bar, branch=branch)
     angle = loop.angles[bar - 1] + math.radians(turned)
     state = inside.state(angle, 1.0)

@@ -15,14 +15,13 @@ from fourbar.errors import InputError
 from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
-from tests.support.robots import FOOT
+from tests.support.robots import FOOT, file_of
 from tests.support.shares import slow_but
 
 
 def pose(text, key=None, **joints):
     """Pose a robot as stated."""
-    model = mujoco.MjModel.from_xml_string(text)
-    return pose_robot(model, PoseOptions(joints=joints, key=key))
+    return pose_robot(file_of(text), PoseOptions(joints=joints, key=key))
 
 
 def position(posed, name):

@@ -35,7 +35,7 @@ LIGHT_LOAD = 0.3
 
 def find_loop(file):
     """Return the model of a robot with one loop, and the loop."""
-    _, posed, loop = pose_loop(file)
+    posed, loop = pose_loop(file)
     return posed.model, loop
 
 

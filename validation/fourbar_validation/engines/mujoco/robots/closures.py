@@ -6,7 +6,7 @@ no joint parts, or a held one, are one bar.
 """
 
 import math
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations, islice, pairwise, permutations
 
@@ -35,7 +35,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
     name_part,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotClosure,
@@ -91,58 +90,44 @@ def list_closures(
 
     A name chooses one of them.
     """
-    compiled = compile_robot(file)
-    posed = pose_robot(compiled.model, options)
-    closures = find_closures(posed, options)
-    if name is not None:
-        closures = [_find_closure(closures, name)]
-    return RobotReport(tuple(closures), (*compiled.notes, *posed.notes))
+    posed = pose_robot(file, options)
+    return RobotReport(tuple(find_closures(posed, name)), posed.notes)
 
 
-def find_closures(posed: PosedRobot, options: PoseOptions) -> list[RobotClosure]:
+def find_closures(posed: PosedRobot, name: str | None = None) -> list[RobotClosure]:
     """Describe each equality of a posed robot, in the order of the file.
+
+    A name chooses one of them.
 
     Raises
     ------
     InputError : a joint that is held or drives is none of the robot's, or drives no
-        loop.
+        loop; no closure has the name.
     """
-    finder = _Finder(posed, options)
+    finder = _Finder(posed)
     closures = [finder.describe(number) for number in range(posed.model.neq)]
-    if options.drive is not None:
-        joint = find_joint(posed.model, options.drive, "--drive")
+    drive = posed.options.drive
+    if drive is not None:
+        joint = find_joint(posed.model, drive, "--drive")
         loops = [closure.loop for closure in closures if closure.loop is not None]
         if not any(joint == loop.hinges["O2"] for loop in loops):
             raise InputError(
                 "--drive",
-                options.drive,
+                drive,
                 "drives no four-bar: it must be a hinge of one, on its ground",
             )
-    return closures
+    if name is None:
+        return closures
+    return [closures[find_named(finder.names, name, "closure", "--loop")]]
 
 
-def _find_closure(closures: Sequence[RobotClosure], name: str) -> RobotClosure:
-    """Return the closure of a name, or raise an InputError that lists what is there."""
-    names = [closure.name for closure in closures]
-    return closures[find_named(names, name, "closure", "--loop")]
+def find_loops(posed: PosedRobot, name: str | None) -> list[RobotLoop]:
+    """Return the four-bars of a posed robot, or that of one closure.
 
-
-def choose_loop(closures: Sequence[RobotClosure], name: str) -> RobotLoop:
-    """Return the four-bar of a closure.
-
-    Raises an InputError that says why there is none.
+    An InputError says why there is none. Of equalities that hold one pin together the
+    first stands for all.
     """
-    closure = _find_closure(closures, name)
-    if closure.loop is None:
-        raise InputError("--loop", name, f"is no four-bar: {closure.reason}")
-    return closure.loop
-
-
-def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
-    """Return the four-bars among closures; an InputError says why there are none.
-
-    Of equalities that hold one pin together the first stands for all.
-    """
+    closures = find_closures(posed, name)
     loops: dict[frozenset[int], RobotLoop] = {}
     for closure in closures:
         loop = closure.loop
@@ -161,19 +146,6 @@ def require_loops(closures: Sequence[RobotClosure]) -> list[RobotLoop]:
             why = f"fourbar-validation loops says why of its {len(closures)} equalities"
         raise InputError("MJCF", None, f"has no planar four-bar: {why}")
     return [*loops.values()]
-
-
-def find_loops(
-    posed: PosedRobot, options: PoseOptions, name: str | None
-) -> list[RobotLoop]:
-    """Return the four-bars of a posed robot, or that of one closure.
-
-    An InputError says why there is none.
-    """
-    closures = find_closures(posed, options)
-    if name is not None:
-        return [choose_loop(closures, name)]
-    return require_loops(closures)
 
 
 def describe_equality(model: mujoco.MjModel, number: int) -> str:
@@ -233,9 +205,9 @@ class _Chain:
 class _Finder:
     """Four-bars of one posed model."""
 
-    def __init__(self, posed: PosedRobot, options: PoseOptions) -> None:
+    def __init__(self, posed: PosedRobot) -> None:
         self.posed = posed
-        self.options = options
+        self.options = posed.options
         self.data = posed.data
         model = self.model = posed.model
         names = [describe_equality(model, number) for number in range(model.neq)]
@@ -246,7 +218,7 @@ class _Finder:
             for number, name in enumerate(names)
         ]
         """Name of each equality, which no other has."""
-        self.held = {find_joint(model, name, "--hold") for name in options.held}
+        self.held = {find_joint(model, name, "--hold") for name in self.options.held}
         self.root = find_roots(model, self.held)
         self.standing: dict[int, int] = {}
         """Hinge that cannot turn, by the closure that holds it.
@@ -506,7 +478,7 @@ class _Finder:
         """Tell whether a closure makes a four-bar with these joints held as well."""
         names = [name_joint(self.model, joint) for joint in held]
         options = replace(self.options, held=(*self.options.held, *names))
-        finder = _Finder(self.posed, options)
+        finder = _Finder(replace(self.posed, options=options))
         return finder.describe(chain.number).loop is not None
 
     def _list_others(self, chain: _Chain) -> list[_Chain]:

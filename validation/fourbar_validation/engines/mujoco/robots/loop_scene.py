@@ -41,11 +41,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import (
-    CompiledRobot,
-    compile_robot,
-    list_unknown_parts,
-)
+from fourbar_validation.engines.mujoco.robots.compiled import list_unknown_parts
 from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -102,19 +98,17 @@ def read_loop_scene(
     ------
     InputError : there is no such four-bar, or one of its masses is unknown.
     """
-    compiled = compile_robot(file)
-    posed = pose_robot(compiled.model, options)
-    loops = find_loops(posed, options, name)
+    posed = pose_robot(file, options)
+    loops = find_loops(posed, name)
     if len(loops) > 1:
         names = ", ".join(loop.name for loop in loops)
         raise InputError("--loop", None, f"states one of the four-bars: {names}")
     (loop,) = loops
     title = f"{loop.name} of {file.path.name}"
-    return make_loop_scene(compiled, posed, loop, speed, title, file.path.name)
+    return make_loop_scene(posed, loop, speed, title, file.path.name)
 
 
 def make_loop_scene(
-    compiled: CompiledRobot,
     posed: PosedRobot,
     loop: RobotLoop,
     speed: float | None,
@@ -122,16 +116,15 @@ def make_loop_scene(
     source: str = "",
 ) -> LoopScene:
     """Make a scene from a loop in its pose; errors as of `read_loop_scene`."""
-    made = SceneOfLoop(compiled, posed, loop)
+    made = SceneOfLoop(posed, loop)
     scene = made.describe(DEFAULT_SPEED if speed is None else speed, title, source)
     remarks = [*loop.chosen, *loop.remarks, *made.remarks]
     if speed is None:
         remarks.append(
             f"a speed of {DEFAULT_SPEED:g} rad/s is taken; --speed states another"
         )
-    notes = (*compiled.notes, *posed.notes)
     parts = (*made.write_parts(), made.write_relation())
-    return LoopScene(scene, made.loop, parts, tuple(remarks), notes)
+    return LoopScene(scene, made.loop, parts, tuple(remarks), posed.notes)
 
 
 def _reflect(model: mujoco.MjModel, joint: int, name: str) -> float:
@@ -222,20 +215,15 @@ def is_seen_from_behind(scene: Scene, angles: Sequence[float]) -> bool:
 class SceneOfLoop(SeenLoop):
     """A scene that is made from one loop."""
 
-    def __init__(
-        self,
-        compiled: CompiledRobot,
-        posed: PosedRobot,
-        loop: RobotLoop,
-    ) -> None:
+    def __init__(self, posed: PosedRobot, loop: RobotLoop) -> None:
         super().__init__(posed.model, loop)
-        self.compiled = compiled
+        self.compiled = posed.compiled
         self.remarks: list[str] = []
         self.shift = 0.0
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
         self.carried = {bar: self.list_parts(bar) for bar in MOVING_BARS}
         self.bodies = {body for bodies in self.carried.values() for body in bodies}
-        parts = list_unknown_parts(compiled, self.bodies)
+        parts = list_unknown_parts(self.compiled, self.bodies)
         if parts:
             self._leave_out(f"the mass of {', '.join(parts)}, whose mesh is missing")
         gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")

@@ -55,10 +55,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import (
-    collect_warnings,
-    compile_robot,
-)
+from fourbar_validation.engines.mujoco.robots.compiled import collect_warnings
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -112,7 +109,7 @@ def measure_loops(
             found = [*_find_loops(file, options)]
         share = 1.0 / len(found)
         measured = tuple(measure_loop(one, options, share=share) for one in found)
-    notes = [*found[0].compiled.notes, *found[0].robot.notes]
+    notes = [*found[0].robot.notes]
     if file.kind != "MJCF" and options.error is not None:
         notes.append(SETTINGS_OF_AN_SDF)
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
@@ -121,12 +118,11 @@ def measure_loops(
 
 def _find_loops(file: RobotFile, options: MeasureOptions) -> Iterator[LoopOfScene]:
     """Yield the loops of a file, each with the scene that is made from it."""
-    compiled = compile_robot(file)
-    posed = pose_robot(compiled.model, options.pose)
-    for loop in find_loops(posed, options.pose, options.loop):
-        made = make_loop_scene(compiled, posed, loop, options.speed, loop.name)
+    posed = pose_robot(file, options.pose)
+    for loop in find_loops(posed, options.loop):
+        made = make_loop_scene(posed, loop, options.speed, loop.name)
         remarked = replace(turn(made.loop, made.scene), remarks=made.remarks)
-        yield LoopOfScene(file, compiled, posed, remarked, (), made.scene)
+        yield LoopOfScene(file, posed, remarked, (), made.scene)
 
 
 def put_loop_inside(
@@ -409,7 +405,7 @@ def examine_file(
         if joint in measured.unmet_stops:
             key = f"pins.{pin}.range"
             described[key] = described[key]._replace(value=UNLIMITED_RANGE)
-    notes = [*found.compiled.notes, *found.robot.notes, *found.parts]
+    notes = [*found.robot.notes, *found.parts]
     notes += [f"MuJoCo warns: {warning}" for warning in warnings]
     return Examined(described, measured, notes)
 

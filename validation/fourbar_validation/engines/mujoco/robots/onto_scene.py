@@ -29,10 +29,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import find_loops
-from fourbar_validation.engines.mujoco.robots.compiled import (
-    CompiledRobot,
-    compile_robot,
-)
+from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
@@ -88,7 +85,6 @@ class LoopOfScene:
     """A loop of a file that a scene is held against."""
 
     file: RobotFile
-    compiled: CompiledRobot
     robot: PosedRobot
     """Robot in a pose of the assembly of the scene."""
     loop: RobotLoop
@@ -160,9 +156,8 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
 
     A loop is driven at either end unless a joint is stated.
     """
-    compiled = compile_robot(file)
-    posed = pose_robot(compiled.model, options.pose)
-    loops = find_loops(posed, options.pose, options.loop)
+    posed = pose_robot(file, options.pose)
+    loops = find_loops(posed, options.loop)
     ways = [*loops]
     if options.pose.drive is None:
         ways = [way for one in loops for way in (one, one.from_other_end or one)]
@@ -185,11 +180,10 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
         bars = "; ".join(_write_bars(model, way) for way in ways)
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
     loop, robot = close_onto(scene, posed, loop)
-    described = SceneOfLoop(compiled, robot, loop)
+    described = SceneOfLoop(robot, loop)
     described.meet_lengths()
     return LoopOfScene(
         file,
-        compiled,
         robot,
         turn(described.loop, scene),
         described.write_parts(),

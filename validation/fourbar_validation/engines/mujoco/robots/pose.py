@@ -9,7 +9,7 @@ the loops.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -24,7 +24,11 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_tied_joints,
     name_joint,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
+from fourbar_validation.engines.mujoco.robots.compiled import (
+    CompiledRobot,
+    compile_robot,
+)
+from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
 from fourbar_validation.engines.mujoco.robots.planes import (
     copy_for_closures,
     evaluate_closures,
@@ -55,24 +59,33 @@ OUTSIDE_A_RANGE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class PosedRobot:
-    """A model in its pose."""
+    """A robot's file, compiled and brought into a pose."""
 
-    model: mujoco.MjModel
+    compiled: CompiledRobot
+    options: PoseOptions
     data: mujoco.MjData
     """State in the pose, closed, positions evaluated."""
     stated: Array
     """Joint positions before the loops were closed, (nq,)."""
     notes: tuple[str, ...]
+    """Sentences on what was done to the file and its pose."""
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """Compiled model."""
+        return self.compiled.model
 
 
-def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
-    """Bring a robot into the pose of the options and close its loops.
+def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
+    """Compile a robot's file, bring it into a pose and close its loops.
 
     Raises
     ------
-    InputError : an unknown joint or keyframe, a position without a unit or of another
-        kind.
+    InputError : what `compile_robot` refuses, an unknown joint or keyframe, a position
+        without a unit or of another kind.
     """
+    compiled = compile_robot(file)
+    model = compiled.model
     stated = _choose_start(model, options)
     held = {find_joint(model, name, "--hold") for name in options.held}
     fixed = {*held}
@@ -87,7 +100,7 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
     closing = _Closing(model, held)
     tied = {*closing.tied, *fixed}
     outside = [joint for joint in find_outside(model, stated) if joint in tied]
-    notes: list[str] = []
+    notes = [*compiled.notes]
     if outside:
         names = ", ".join(name_joint(model, joint) for joint in outside)
         notes.append(f"outside their ranges before closing: {names}")
@@ -107,7 +120,8 @@ def pose_robot(model: mujoco.MjModel, options: PoseOptions) -> PosedRobot:
         notes.append(closing.say_open(options, stated, left))
     elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
-    return PosedRobot(model, _evaluate_kinematics(model, closed), stated, tuple(notes))
+    data = _evaluate_kinematics(model, closed)
+    return PosedRobot(compiled, options, data, stated, tuple(notes))
 
 
 def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:
@@ -134,7 +148,7 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
     """Return a robot whose loops are closed in another pose."""
     data = _evaluate_kinematics(posed.model, qpos)
-    return PosedRobot(posed.model, data, qpos, posed.notes)
+    return replace(posed, data=data, stated=qpos)
 
 
 def find_joint(
