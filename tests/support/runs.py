@@ -4,7 +4,13 @@ from dataclasses import replace
 
 from pandas import DataFrame
 
-from fourbar_validation.compare.rows import AGREES, COLUMN_TYPES, Row, write_results
+from fourbar_validation.compare.rows import (
+    AGREES,
+    COLUMN_TYPES,
+    VERDICTS,
+    Row,
+    write_results,
+)
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
@@ -18,6 +24,8 @@ ROW = Row(
     "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
 )
 """A row that agrees."""
+WORDS = {verdict.partition(" ")[0]: verdict for verdict in VERDICTS}
+"""Verdicts by their first words."""
 FORMS = (
     render.write_junit_of_changes,
     render.write_differences,

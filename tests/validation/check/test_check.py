@@ -405,7 +405,6 @@ IN_THESIS = {
     "gravity along -y is included": gravity(9.81),
     "bars.coupler.inertia left out": bars(scaled(inertia=0.0), "coupler"),
     "bars.*.inertia left out": bars(scaled(inertia=0.0)),
-    "bars.coupler.inertia 0.5 times ours": bars(scaled(inertia=0.5), "coupler"),
     "bars.output.inertia 10000 times ours": bars(scaled(inertia=1e4), "output"),
     **{
         f"on bar {bar} instead of bar 4": solved(partial(replace, drive_bar=bar))
@@ -421,11 +420,6 @@ IN_THESIS = {
         factor=0.37,
     ),
     **{f"loads {done}": loads_times(x) for done, x in FACTORS.items()},
-    **{
-        f"loads.{i}.{'force' if load.force else 'moment'} {done}": loads_times(x, i)
-        for i, load in enumerate(THESIS.loads)
-        for done, x in FACTORS.items()
-    },
     "loads.0.force 0.1 times ours": loads_times(0.1, 0),
     "theta_4 or": changed(lambda right: {"theta_4": right["theta_4"] + math.pi}),
     "relative to bar 3": relative_to("theta_3"),
@@ -462,9 +456,7 @@ IN_CRANK_ROCKER = {
     ),
     "effects.gravity left out": gravity(),
     "effects.gravity reversed": gravity(-9.81),
-    "effects.gravity doubled": gravity(2.0 * 9.81),
     "effects.gravity.1 left out": gravity(9.81, 0.0),
-    "effects.gravity.1 doubled": gravity(9.81, math.pi),
     "effects.gravity 0.101937 times ours": gravity(1.0),
     "statics": solved(speed=0.0, acceleration=0.0),
     **{
@@ -518,7 +510,6 @@ IN_CRANK_ROCKER = {
     "in radians where degrees": units("theta_2", factor=math.pi / 180),
     "relative to bar 2": relative_to("theta_2"),
     "omega_2 0.5 times ours": solved(speed=5.0),
-    "omega_2 1.7 times ours": solved(speed=17.0),
     "theta_2 counted clockwise, with all angles and torques": mirrored(1.0),
     "all angles and torques, and y reversed": mirrored((1.0, -1.0)),
     "one step late: numbers of the position before": changed(

@@ -41,14 +41,11 @@ from fourbar_validation.run.judge import judge, judge_for_report
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_here, summary_of
 from tests.support.rows import read_rows
-from tests.support.runs import ROW, changed, compare_made_here
+from tests.support.runs import ROW, WORDS, changed, compare_made_here
 from tests.support.scenes import bare, crank_rocker
 from tests.validation.run.test_judge import NEAR_ITS_LIMIT, ROCKER, Echo, echo, refuse
 
 NAN = math.nan
-
-
-WORDS = {verdict.partition(" ")[0]: verdict for verdict in VERDICTS}
 
 
 def rows(text):

@@ -9,14 +9,14 @@ from dataclasses import replace
 import pytest
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar_validation.compare.rows import DEGRADED, FAILS, REFUSES
-from fourbar_validation.compare.tolerance import EPS, EQUIVALENCE
+from fourbar_validation.compare.rows import FAILS, REFUSES
+from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.regression import render
 from fourbar_validation.regression.changes import Kind, write_fault_sentence
 from fourbar_validation.regression.record import NOTHING_KNOWN
 from tests.support import runs
 from tests.support.rows import read_rows
-from tests.support.runs import FORMS, compare_made_here, compare_rows, kinds
+from tests.support.runs import FORMS, WORDS, compare_made_here, compare_rows, kinds
 
 WHY = "Cannot find module 'x'"
 ROW = runs.changed(allowed=1e-9, reason="")
@@ -29,40 +29,49 @@ def changed(**fields):
 NAN = math.nan
 FAILING = changed(verdict=FAILS)
 OTHER = changed(quantity="F12")
-SIMULATED = changed(error=1e-6, allowed=1e-5)
-HARD = changed(condition=0.01, allowed=1e-13)
-ALARM = changed(quantity="watch", verdict=FAILS, error=NAN)
+KINDS = read_rows("""
+agrees 1e-15 1e-9 | agrees 1e-15 1e-9 | same
+fails 1e-15 1e-9 | fails 1e-15 1e-9 | fails as before
+# round-off of an exact comparison are 50 last digits, 1.1e-14
+agrees 1e-15 1e-9 | agrees 9.8e-15 1e-9 | same
+agrees 1e-15 1e-9 | agrees 1.33e-14 1e-9 | grew within its allowance
+agrees 1e-15 1e-15 | agrees 1.33e-14 1e-9 | worse
+# over the condition
+agrees 1e-15 1e-13 0.01 | agrees 6.6e-13 1e-13 0.01 | same
+agrees 1e-15 1e-13 0.01 | agrees 1.33e-12 1 0.01 | worse
+agrees 1e-15 1e-13 0.01 | agrees 1.33e-12 1e-13 1 | worse
+# and of a simulation a quarter
+agrees 1e-6 1e-5 | agrees 1.2e-6 1e-5 | same
+agrees 1e-6 1e-5 | agrees 1.3e-6 1e-5 | grew within its allowance
+agrees 1e-6 1e-5 | agrees 1.3e-5 1 | worse
+agrees 1e-6 1e-5 | agrees 0.7e-6 1e-5 | better
+agrees 1e-6 1e-5 | agrees 0.9e-6 1e-5 | same
+agrees 1e-15 1e-9 | degraded 1e-15 1e-9 | verdict got worse
+agrees 1e-15 1e-9 | refuses nan 1e-9 | verdict got worse
+agrees 1e-15 1e-9 | fails nan 1e-9 | verdict got worse
+fails 1e-15 1e-9 | agrees 1e-15 1e-9 | verdict got better
+fails 1e-15 1e-9 | fails nan 1e-9 | worse
+agrees 1e-15 1e-9 | | gone
+fails 1e-15 1e-9 | | gone
+fails nan 1e-9 1 exact watch | | gone, and had failed
+ | agrees 1e-15 1e-9 1 exact F12 | new
+ | fails 1e-15 1e-9 1 exact F12 | new, and fails
+agrees 1e-15 1e-9 | agrees 1 1e-9 1 h/2 | not compared
+agrees 1e-15 1e-9 | fails 1e-15 1e-9 1 h/2 | new, and fails
+fails 1e-15 1e-9 | fails 1e-15 1e-9 1 h/2 | not compared
+""")
+"""Row of the old and of the new run, and what happened: each line in its own scene.
+
+Of a row verdict, error and what is allowed, then condition, setting and quantity.
+"""
 
 
-KINDS = [
-    (ROW, ROW, Kind.SAME),
-    (FAILING, FAILING, Kind.STILL_FAILS),
-    (ROW, changed(error=ROW.error + 40 * EPS), Kind.SAME),
-    (ROW, changed(error=60 * EPS), Kind.GREW),
-    (changed(allowed=1e-15), changed(error=60 * EPS), Kind.WORSE),
-    (HARD, replace(HARD, error=3000 * EPS), Kind.SAME),
-    (HARD, replace(HARD, error=6000 * EPS, allowed=1.0), Kind.WORSE),
-    (HARD, replace(HARD, error=6000 * EPS, condition=1.0), Kind.WORSE),
-    (SIMULATED, replace(SIMULATED, error=1.2e-6), Kind.SAME),
-    (SIMULATED, replace(SIMULATED, error=1.3e-6), Kind.GREW),
-    (SIMULATED, replace(SIMULATED, error=1.3e-5, allowed=1), Kind.WORSE),
-    (SIMULATED, replace(SIMULATED, error=0.7e-6), Kind.BETTER),
-    (SIMULATED, replace(SIMULATED, error=0.9e-6), Kind.SAME),
-    (ROW, changed(verdict=DEGRADED), Kind.VERDICT_WORSE),
-    (ROW, changed(verdict=REFUSES, error=NAN), Kind.VERDICT_WORSE),
-    (ROW, changed(verdict=FAILS, error=NAN), Kind.VERDICT_WORSE),
-    (FAILING, ROW, Kind.VERDICT_BETTER),
-    (FAILING, changed(verdict=FAILS, error=NAN), Kind.WORSE),
-    (ROW, None, Kind.GONE),
-    (FAILING, None, Kind.GONE),
-    (ALARM, None, Kind.GONE_FAILURE),
-    (None, OTHER, Kind.NEW),
-    (None, replace(OTHER, verdict=FAILS, reason=WHY), Kind.NEW_FAILURE),
-    (ROW, changed(setting="h/2", error=1.0), Kind.NOT_COMPARED),
-    (ROW, changed(setting="h/2", verdict=FAILS), Kind.NEW_FAILURE),
-    (FAILING, changed(setting="h/2", verdict=FAILS), Kind.NOT_COMPARED),
-]
-"""Row of the old and of the new run, and what happened: each line in its own scene."""
+def make_row(word, error, allowed, condition=1, setting="exact", quantity="torque"):
+    """Return a row of these words."""
+    numbers = {"error": float(error), "allowed": float(allowed)}
+    numbers["condition"] = float(condition)
+    named = {"verdict": WORDS[word], "setting": setting, "quantity": quantity}
+    return changed(**numbers, **named)
 
 
 @pytest.fixture(scope="module")
@@ -71,9 +80,9 @@ def compared():
     runs = ([], [])
     for number, (*both, _) in enumerate(KINDS):
         beside = changed(engine="formulas", error=0.0, allowed=0.0)
-        for run, row in zip(runs, both, strict=True):
-            scene = f"case {number}"
-            run += [replace(one, scene=scene) for one in (row, beside) if one]
+        for run, text in zip(runs, both, strict=True):
+            rows = [make_row(*text.split()), beside] if text else [beside]
+            run += [replace(one, scene=f"case {number}") for one in rows]
     return compare_made_here(*runs)
 
 
@@ -94,7 +103,9 @@ def test_kinds_are_counted_and_shown(compared):
         assert f" {count} {kind}" in verdict
         shown = f"\n{kind.capitalize()}: case " in f"\n{text}"
         assert shown == (kind != Kind.SAME)
-    assert all(WHY in html.unescape(form(compared)) for form in FORMS)
+    newly = replace(OTHER, verdict=FAILS, reason=WHY)
+    found = compare_made_here([ROW], [ROW, newly])
+    assert all(WHY in html.unescape(form(found)) for form in FORMS)
 
 
 def test_settings_are_paired_only_where_each_run_has_one_of_its_own():

@@ -8,11 +8,9 @@ import re
 from dataclasses import replace
 from functools import cache
 
-import mujoco
 import numpy as np
 import pytest
 from pytest import approx
-from scipy.optimize import bisect
 
 import fourbar
 from fourbar.effects import Flywheel, Friction
@@ -45,7 +43,6 @@ from tests.support.robots import (
     answer_of,
     examine_text,
     file_of,
-    forward,
     judge_path,
     notes_of,
     read_scene,
@@ -71,8 +68,6 @@ state, as measured.
 """
 SOFT_LOOP = 5e-5
 """Pin forces of it, of their largest: the loop yields to the friction, 4.6e-5."""
-BISECTED = 1e-9
-"""Relative; both solve for the same couple, and the solver's noise is 1e-11."""
 
 
 def default_friction():
@@ -99,19 +94,6 @@ def error_of(scene, examined, how, name):
     if ours.ndim == 2:
         difference, size = np.hypot(*difference.T), np.hypot(*ours.T)
     return float(np.abs(difference).max() / size.max())
-
-
-def bisect_on_the_couple(text):
-    """Return MuJoCo's couple on the input, N m, in keyframe 0, at constant speed."""
-    model, data = forward(text)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-
-    def accelerate(couple):
-        data.qfrc_applied[0] = couple
-        mujoco.mj_forward(model, data)
-        return data.qacc[0]
-
-    return bisect(accelerate, -100.0, 100.0, xtol=1e-15)
 
 
 def list_keys(scene, examined, *parts):
@@ -190,15 +172,6 @@ def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it(
         size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
         off = error_of(DRY, examined_dry(), FILE_AT_ONE_STATE, pin)
         assert left[pin] / size == approx(off, rel=1e-3)
-
-
-@pytest.mark.slow
-def test_the_couple_is_the_one_that_bisection_finds():
-    answer = answer_of(examined_dry(), FILE_AT_ONE_STATE)
-    assert answer.at.theta_2[0] == approx(math.radians(30.0))
-    bisected = bisect_on_the_couple(default_friction())
-    assert answer.quantities["torque"][0] == approx(bisected, rel=BISECTED)
-    assert bisected == approx(1.2243167, abs=5e-8)  # and 1.2243155 by formulas
 
 
 def test_armature_of_the_driven_hinge_is_the_flywheel_of_the_scene():
