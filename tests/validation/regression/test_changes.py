@@ -38,6 +38,7 @@ agrees 1e-15 1e-9 | agrees 1.33e-14 1e-9 | grew within its allowance
 agrees 1e-15 1e-15 | agrees 1.33e-14 1e-9 | worse
 # over the condition
 agrees 1e-15 1e-13 0.01 | agrees 6.6e-13 1e-13 0.01 | same
+agrees 1e-15 1e-13 0.01 | agrees 6.6e-13 1e-13 1 | same
 agrees 1e-15 1e-13 0.01 | agrees 1.33e-12 1 0.01 | worse
 agrees 1e-15 1e-13 0.01 | agrees 1.33e-12 1e-13 1 | worse
 # and of a simulation a quarter

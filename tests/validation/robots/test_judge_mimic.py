@@ -61,12 +61,7 @@ UPRIGHT = """<mujoco><worldbody>
 PAD = """<body pos="0 0.04 0"><joint name="pad"/><geom size="0.004"/></body>"""
 
 
-def write_upright(
-    folder,
-    polycoef="0 1 0 0 0",
-    sense=1,
-    pad=PAD,
-):
+def write_upright(folder, polycoef="0 1 0 0 0", sense=1, pad=PAD):
     path = folder / "upright.xml"
     path.write_text(UPRIGHT.format(polycoef=polycoef, sense=sense, pad=pad))
     return path
@@ -86,10 +81,7 @@ def shown(capsys):
 @pytest.mark.slow
 @pytest.mark.parametrize("sense, pad", [(1, PAD), (1, ""), (-1, PAD), (-1, "")])
 def test_theta_2_is_counted_from_where_the_file_has_the_bar(
-    sense,
-    pad,
-    tmp_path,
-    shown,
+    sense, pad, tmp_path, shown
 ):
     report = measure_mimic(
         write_upright(tmp_path, sense=sense, pad=pad), "rocker_j", GRIPPER
@@ -208,9 +200,7 @@ def test_an_axis_the_other_way_takes_the_opposite_polynomial(tmp_path):
     [(np.square, 1, 0.5), (np.abs, 2, 0.125), (lambda x: x**3, 2, 0.25)],
 )
 def test_the_smallest_largest_error_is_that_of_the_textbooks(
-    function,
-    degree,
-    smallest,
+    function, degree, smallest
 ):
     """Chebyshev's theorem.
 
@@ -345,9 +335,7 @@ def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
 
 @pytest.mark.parametrize("ground", [0.03, 0.04])
 def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
-    tmp_path,
-    shown,
-    ground,
+    tmp_path, shown, ground
 ):
     """A coupler that stays parallel turns by -theta_2 on the crank.
 

@@ -8,7 +8,6 @@ import math
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,17 +37,15 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.report.run_summary import Summary
+from fourbar_validation.places import MODELS
 from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
+from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
 
-SCENE = crank_rocker(
-    motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0),
-    loads=(),
-)
-CAPABILITIES = Path(__file__).parents[3] / "models" / "capabilities"
+SCENE = crank_rocker(motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
+CAPABILITIES = MODELS / "capabilities"
 SOLVER = PLAIN.partition("\nNAMES =")[0]
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 PIN_FORCES = ("F12", "F32", "F43", "F14")
@@ -83,26 +80,14 @@ def make_guest(*replacements):
             ]
             numbers = {name: np.array([row[name] for row in rows]) for name in rows[0]}
             assembled = np.ones(len(rows), dtype=bool)
-            return Answer(
-                self.name,
-                "exact",
-                at,
-                assembled,
-                numbers,
-            )
+            return Answer(self.name, "exact", at, assembled, numbers)
 
     return Plain
 
 
-def shift(*names):
-    """Return a change that gives the numbers of the position before."""
-
-    def change(numbers, at):
-        for name in names or numbers.keys() - {"theta_2"}:
-            values = numbers[name]
-            numbers[name] = np.concatenate((values[:1], values[:-1]))
-
-    return change
+def give_position_before(numbers, at):
+    values = numbers["torque"]
+    numbers["torque"] = np.concatenate((values[:1], values[:-1]))
 
 
 def turn_into_bars(numbers, at):
@@ -146,8 +131,7 @@ TURNED = {
 
 
 CHANGED = {
-    "one step late: numbers of the position before: torque": shift("torque"),
-    "one step late: numbers of the position before": shift(),
+    "one step late: numbers of the position before: torque": give_position_before,
     "each force is in the frame of the bar on which it acts, not in world axes": (
         turn_into_bars
     ),
@@ -268,15 +252,9 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(cut, bar, joint, b
 
 
 def find_causes(guest, scene=SCENE):
-    engine = Engine("plain", guest, EQUIVALENCE)
-    record = judge(
-        "scene",
-        scene,
-        [engine],
-    )
-    assert any(row.engine == "plain" for row in record.rows)
-    failed = any(row.engine == "plain" and row.failed for row in record.rows)
-    assert failed or "plain" not in record.causes
+    record = judge("scene", scene, [Engine("plain", guest, EQUIVALENCE)])
+    failed = [row.failed for row in record.rows if row.engine == "plain"]
+    assert failed and (any(failed) or "plain" not in record.causes)
     causes = record.causes.get("plain", [])
     return [cause.removesuffix(", all else agrees") for cause in causes]
 
@@ -360,11 +338,7 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
             numbers[quantity] = values + np.ptp(values) * ripple.reshape(values.shape)
 
     engine = Engine("plain", partial(Altered, spoil), EQUIVALENCE)
-    rows = judge(
-        "scene",
-        HARD_TO_EXPLAIN[name],
-        [engine],
-    ).rows
+    rows = judge("scene", HARD_TO_EXPLAIN[name], [engine]).rows
     failed = {row.quantity for row in rows if row.failed}
     assert "F12" in failed and "all" not in failed
 
@@ -414,14 +388,12 @@ def test_a_mistake_of_the_inertia_alone_is_said_to_be_there():
     class OfInertia(Altered):
         def answer(self, scene, at):
             answer = super().answer(scene, at)
+            answer.quantities.pop("torque_inertia", None)
             if not scene.effects:
                 answer.quantities["torque"] *= 1.5
             return answer
 
-    def ask_twice(numbers, at):
-        numbers.pop("torque_inertia", None)
-
-    (cause,) = find_causes(partial(OfInertia, ask_twice))
+    (cause,) = find_causes(partial(OfInertia, nothing))
     words = "without loads and effects: every number is 1.5 times ours: torque"
     assert cause == words
 
@@ -435,12 +407,7 @@ def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     scene = replace(scene, effects=(Gravity(),))
     linkage = scene.linkage
-    massless = replace(
-        linkage.coupler,
-        mass=0.0,
-        density=None,
-        inertia=0.0,
-    )
+    massless = replace(linkage.coupler, mass=0.0, density=None, inertia=0.0)
     light = replace(scene, linkage=replace(linkage, coupler=massless))
 
     def leave_out_weight(numbers, at):
@@ -745,14 +712,7 @@ def name_wrong(changes, tolerance=EQUIVALENCE):
         Engine(name, partial(Named, name, change), tolerance, ("F43", "torque"))
         for name, change in changes.items()
     ]
-    summary = Summary()
-    summary.add(
-        judge(
-            "scene",
-            SCENE,
-            engines,
-        )
-    )
+    summary = summary_of([judge("scene", SCENE, engines)])
     return {cause.engine: cause.text for cause in summary.causes}
 
 
