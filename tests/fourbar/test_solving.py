@@ -38,7 +38,6 @@ from fourbar import (
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
-from fourbar.show.plot import draw
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     bare,
@@ -268,14 +267,6 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
     assert jammed.any() and np.isfinite(solution.torque).all()
     lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)
     assert np.array_equal(lost, jammed)
-
-
-def test_free_bodies_without_forces_are_refused_with_the_reason(tmp_path):
-    scene = Scene(PARALLELOGRAM, Motion(np.array([0.3]), 1.0), 3)
-    said = r"freebody.*no value at theta_2 = 17\.1887 deg: no_torque"
-    with raises(InputError, match=said):
-        draw(scene, tmp_path / "figure.svg", "freebody")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_blocks_of_a_sweep_are_solved_like_its_positions():

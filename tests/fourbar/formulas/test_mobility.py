@@ -22,7 +22,6 @@ from fourbar.formulas.mobility import (
     time_ratio,
     turns_fully,
 )
-from fourbar.formulas.path import compute_state
 from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, draw_linkage
@@ -189,14 +188,8 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
     assert checked > 300
 
 
-def test_time_ratio_is_the_time_of_both_strokes():
-    """A central crank-rocker, d^2 + a^2 = b^2 + c^2, has equal strokes."""
-    bars, n = uniform(3.0, 1.0, 2.5, 2.2), 200_000
-    theta_2 = (np.arange(n) + 0.5) * (tau / n)
-    ahead = np.count_nonzero(compute_state(bars, theta_2, 1).k.h4 > 0.0)
-    ratio = max(ahead, n - ahead) / min(ahead, n - ahead)
-    # both ends are counted to one step
-    assert time_ratio(bars) == approx(ratio, rel=8.0 / n)
+def test_a_central_crank_rocker_has_strokes_of_one_time_and_others_may_have_none():
+    """It has d^2 + a^2 = b^2 + c^2."""
     central = uniform(sqrt(2.5**2 + 2.2**2 - 1), 1, 2.5, 2.2)
     assert time_ratio(central) == approx(1.0, abs=1e-14)
     # limits of the output alone are not enough: there are change points

@@ -7,10 +7,10 @@ import numpy as np
 from pytest import approx
 
 from fourbar import Motion, Scene, solve, transmission_extremes
-from fourbar.formulas.mobility import find_intervals, limit_positions
+from fourbar.formulas.mobility import find_intervals
 from fourbar.show.derived import derive
 from tests.fourbar.formulas.test_points import random_positions
-from tests.support.scenes import bare, draw_linkage
+from tests.support.scenes import draw_linkage
 
 EPS = 2.0**-52
 ANGLE = 16.0 * EPS
@@ -65,17 +65,3 @@ def test_extremes_are_those_of_a_scan():
             assert e**2 == approx(by_cosines, abs=64 * EPS)
         assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4
-
-
-def test_advantage_where_the_output_stands_and_where_the_input_does():
-    folded = bare(2.0, 1.0, 1.0, 2.0)  # a kite with B on O2
-    assert not np.isfinite(derive_at("mechanical_advantage", folded, 1.0, -1))
-    rocker = bare(3.0, 2.5, 1.0, 2.2)
-    limit = limit_positions(rocker)[0].theta_2
-    near = limit + np.array([1e-4, 1e-6, 1e-8])
-    advantage = np.abs(derive_at("mechanical_advantage", rocker, near, 1))
-    # it falls as the root of the distance
-    assert advantage[:-1] / advantage[1:] == approx([10.0, 10.0], rel=1e-2)
-    parallelogram = bare(2.0, 1.0, 2.0, 1.0)
-    for name in ("omega_4/omega_2", "mechanical_advantage"):
-        assert derive_at(name, parallelogram, 0.0, 1) == 1.0

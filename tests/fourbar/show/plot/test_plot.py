@@ -477,8 +477,9 @@ OTHERS = {
     "law": by_law(),
     "release": released(),
     "three rockers": thesis(),
+    "no torque": fourbar.Scene(fourbar.uniform(*PARALLELOGRAM), Motion([0.3], 1.0), 3),
 }
-REFUSED = read_rows("""
+REFUSED = read_rows(r"""
 crank-rocker | {} | must
 crank-rocker | {"figure": "pie"} | must
 crank-rocker | {"figure": "torque", "dimensions": true} | left out of the figure torque
@@ -490,10 +491,13 @@ law | {"figure": "energy"} | free motion
 three rockers | {"figure": "linkage", "position": 0.7853981633974483} | 45 deg
 release | {"figure": "torque"} | free motion
 release | {"position": 9.0} | does not pass
+no torque | {"figure": "freebody"} | no value at theta_2 = 17\.1887 deg: no_torque
 """)
 
 
-@pytest.mark.parametrize("name, options, words", slow_but(REFUSED[:8], REFUSED))
+@pytest.mark.parametrize(
+    "name, options, words", slow_but(REFUSED[:8] + REFUSED[-1:], REFUSED)
+)
 def test_what_cannot_be_drawn_is_named_and_leaves_no_file(
     tmp_path, name, options, words
 ):
