@@ -19,7 +19,6 @@ from fourbar_validation.published import comparison as command
 from fourbar_validation.published.comparison import (
     MISPRINT,
     REPRODUCED,
-    TEXTBOOK_FOLDER,
     UNEXPLAINED,
     explain_difference,
     list_figures,
@@ -36,6 +35,7 @@ from fourbar_validation.published.printed_figures import (
 from fourbar_validation.published.thesis import (
     BAR_LENGTHS,
     LADDER,
+    TEXTBOOK_FOLDER,
     THETA_1,
     THETA_2,
     compute_model,

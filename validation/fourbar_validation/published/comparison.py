@@ -6,19 +6,18 @@ Ours stand beside them, and differences are explained.
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-import fourbar
 from fourbar.errors import FAILED, HOLDS
 from fourbar.formulas.mobility import TURN
 from fourbar.show.lines import wrap_line
 from fourbar.writing import write_text
-from fourbar_validation.places import HARNESS_PROGRAM, MODELS
+from fourbar_validation.places import HARNESS_PROGRAM
 from fourbar_validation.published.printed_figures import (
     ERRATA,
     FIGURE_VERDICTS,
@@ -46,7 +45,6 @@ _TAKEN: dict[str, Callable[[Any], Any]] = {
     "rad": lambda vector: np.angle(vector) % TURN,
 }
 """Component, size and direction: from -180 to 180 deg, and within one turn."""
-TEXTBOOK_FOLDER = MODELS / "textbook"
 PAGE_WIDTH = 78
 _ERRATUM = (
     "#{id} {where}: printed {printed}. Right: {right}. Why: {derivation}. Effect:"
@@ -66,21 +64,13 @@ def list_figures() -> Iterator[PublishedFigure]:
         yield figure._replace(ours=ours, made=made)
 
 
-@cache
-def _solve_scene(name: str) -> Any:
-    return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{name}.toml"))
-
-
 def _compute(figure: PublishedFigure, errata: tuple[str, ...]) -> float:
     """Compute a figure, a result of ours or the sum of several, with errata made."""
-    results = compute_results(errata)
-    if figure.scene:
-        results = _solve_scene(figure.scene)
+    results = compute_results(errata, figure.scene)
     total = 0.0
     for sign, name, part in _TERM.findall(figure.quantity):
         value = np.atleast_1d(results[name])[figure.position]
-        vector = complex(*np.ravel(value))
-        term = _TAKEN[part](vector)
+        term = _TAKEN[part](complex(*np.ravel(value)))
         total += -term if sign == "-" else term
     return float(total)
 

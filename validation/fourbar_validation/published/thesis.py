@@ -24,6 +24,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar_validation.places import MODELS
 
+TEXTBOOK_FOLDER = MODELS / "textbook"
 BAR_LENGTHS = (20.0, 48.0, 55.0, 20.0)
 """Bars 1 to 4, cm."""
 THETA_1, THETA_2 = math.radians(225.0), math.radians(135.0)
@@ -50,7 +51,6 @@ _TYPED_INERTIAS = 0.292472, 0.107526
 LADDER = ("3", "1", "2", "4", "5", "5b")
 """Errata in the order in which they are made, from right to published."""
 d, a, b, c = BAR_LENGTHS
-_ACCELERATIONS = ("a_A", "a_G2", "a_G3", "a_G4")
 Results = dict[str, Any]
 """Numbers, and vectors x + i y, by the names that the data give to results. Lists are
 of bars 2, 3 and 4, or of what the data count.
@@ -73,8 +73,13 @@ def make_model_scene(theta_2: Array | float, branch: int = 1) -> fourbar.Scene:
 
 
 @cache
-def compute_results(errata: tuple[str, ...] = ()) -> Results:
-    """Compute what every table has, with these errata made."""
+def compute_results(errata: tuple[str, ...], scene: str = "") -> Any:
+    """Compute what every table has, with these errata made, or solve another scene.
+
+    `scene`: of TEXTBOOK_FOLDER; empty for the thesis.
+    """
+    if scene:
+        return fourbar.solve(fourbar.load(TEXTBOOK_FOLDER / f"{scene}.toml"))
     return {
         **_compute_positions("6" in errata),
         **_compute_limits("14" in errata),
@@ -100,7 +105,9 @@ def compute_model(errata: tuple[str, ...] = ()) -> Results:
         np.array([s[f"{rate}_{number}"][0] for number in MOVING_BARS])
         for rate in ("omega", "alpha")
     )
-    a_A, *a_G = (100.0 * complex(*s[name][0]) for name in _ACCELERATIONS)
+    a_A, *a_G = (
+        100.0 * complex(*s[name][0]) for name in ("a_A", "a_G2", "a_G3", "a_G4")
+    )
     lacking = _TO_N * masses * a_G
     couple = _TO_N * inertias * alpha
     if "4" in errata:
