@@ -195,11 +195,7 @@ class SceneFile:
                 table[last] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
                 continue
             table, last = find_entry(document, key)
-            old = table[last]
-            if isinstance(old, list):
-                table[last] = [_change_entry(entry, change) for entry in old]
-            else:
-                table[last] = _change_entry(old, change)
+            table[last] = _change_entry(table[last], change)
         if drawn:
             self._keep_on_ground(document, document["pins"])
         try:
@@ -231,6 +227,9 @@ def _read(quantity):
 
 
 def _change_entry(quantity, change):
+    """Change a number of a file, or each of a list."""
+    if isinstance(quantity, list):
+        return [_change_entry(entry, change) for entry in quantity]
     number, _, unit = str(quantity).partition(" ")
     changed = float(number) + change
     return f"{changed!r} {unit}" if unit else changed
@@ -248,7 +247,7 @@ def is_near_change_point(linkage):
     """Return whether two lengths are together nearly as long as the other two."""
     d, a, b, c = linkage.lengths
     differences = d + a - b - c, d + b - a - c, d + c - a - b
-    least = min(abs(difference) for difference in differences)
+    least = min(map(abs, differences))
     return least <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
 
 
@@ -348,11 +347,11 @@ def split_unknowns(answer):
     Vectors become components, pin forces also their magnitudes.
     """
     parts = {}
-    for name in (name for name in (*UNKNOWNS, LINE.value) if name in answer.quantities):
-        values = answer.quantities[name]
-        if name in SCALARS:
+    for name in (*UNKNOWNS, LINE.value):
+        values = answer.quantities.get(name)
+        if name in SCALARS and values is not None:
             parts[name] = values
-        else:
+        elif values is not None:
             parts |= {
                 f"{name}_x": values[:, 0],
                 f"{name}_y": values[:, 1],

@@ -14,12 +14,12 @@ from fourbar_validation.engines.balls import (
 )
 
 
-def answer_in_balls(scene, at=None):
+def answer_in_balls(scene):
     """Compute each output at each position, rounded once.
 
     (n,), vectors (n, 2), NaN where it has no value.
     """
-    at = with_signs(scene.linkage, fourbar.command(scene) if at is None else at)
+    at = with_signs(scene.linkage, fourbar.command(scene))
     rows = []
     with ctx.workprec(ctx.prec):
         places = at.stated[0]

@@ -4,12 +4,12 @@ from fourbar_validation.advise.worst_errors import ERROR_NAMES, WorstErrors
 from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 
-def point(steps, worst, curve="c", kind=STEPPED_MOTION):
+def point(steps, worst, curve="c"):
     """Return a point with one error of all quantities and a microsecond a step."""
     errors = WorstErrors(*[worst] * len(ERROR_NAMES))
     return CostPoint(
         curve,
-        kind,
+        STEPPED_MOTION,
         f"{steps:g} steps a revolution",
         steps,
         int(steps),

@@ -34,9 +34,9 @@ def summary_of(records):
     return summary
 
 
-def judge_by(engine, scene, **how):
+def judge_by(engine, scene):
     """The rows of one engine on a scene, by quantity."""
-    rows = judge("scene", scene, [engine], **how).rows
+    rows = judge("scene", scene, [engine]).rows
     return {row.quantity: row for row in rows if row.engine == engine.name}
 
 

@@ -15,17 +15,21 @@ class Right:
     name = "right"
 
     def answer(self, scene, command):
-        return FreeBody().answer(scene, command)
+        answer = FreeBody().answer(scene, command)
+        self.spoil(answer.quantities)
+        return answer
+
+    def spoil(self, quantities):
+        """Change what is answered."""
 
 
 class Angle(Right):
     name = "angle"
     quantities = ("theta_3",)
 
-    def answer(self, scene, command):
-        answer = super().answer(scene, command)
-        answer.quantities = {"theta_3": answer.quantities["theta_3"]}
-        return answer
+    def spoil(self, quantities):
+        for name in quantities.keys() - {"theta_3"}:
+            del quantities[name]
 
 
 class Releases(Right):
@@ -59,7 +63,7 @@ class Changes(Right):
 
     name = "changes"
 
-    def answer(self, scene, command):
+    def spoil(self, quantities):
         from fourbar_validation.compare import compare, rows
         from fourbar_validation.compare.tolerance import EQUIVALENCE
         from fourbar_validation.run import judge
@@ -67,9 +71,7 @@ class Changes(Right):
         for module in (compare, rows, judge):
             module.FAILS = module.AGREES = "agrees"
         object.__setattr__(EQUIVALENCE, "factor", 1e30)
-        answer = super().answer(scene, command)
-        answer.quantities["torque"] = 1.01 * answer.quantities["torque"]
-        return answer
+        quantities["torque"] = 1.01 * quantities["torque"]
 
 
 class Prints(Right):
@@ -102,29 +104,24 @@ class Lacks(Right):
     name = "lacks"
     quantities = ("theta_3", "theta_4", "torque")
 
-    def answer(self, scene, command):
-        answer = super().answer(scene, command)
-        theta = answer.quantities["theta_3"]
-        answer.quantities = {"theta_3": theta, "theta_4": np.nan * theta}
-        return answer
+    def spoil(self, quantities):
+        quantities["theta_4"] = np.nan * quantities["theta_4"]
+        for name in quantities.keys() - {"theta_3", "theta_4"}:
+            del quantities[name]
 
 
 class Shapes(Right):
     name = "shapes"
 
-    def answer(self, scene, command):
-        answer = super().answer(scene, command)
-        answer.quantities["F12"] = answer.quantities["F12"].T
-        return answer
+    def spoil(self, quantities):
+        quantities["F12"] = quantities["F12"].T
 
 
 class Complex(Right):
     name = "complex"
 
-    def answer(self, scene, command):
-        answer = super().answer(scene, command)
-        answer.quantities["torque"] = answer.quantities["torque"].astype(complex)
-        return answer
+    def spoil(self, quantities):
+        quantities["torque"] = quantities["torque"].astype(complex)
 
 
 class Elsewhere(Right):

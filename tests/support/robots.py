@@ -299,11 +299,7 @@ def mend(scene, file, names, changes):
     """Return the answers of a file with each entry as in the generated one."""
     options = replace(AS_DRAWN, names=names)
     mended = examine_mended(scene, file_of(file), options, changes)
-    return list(map(_answers_or_none, mended))
-
-
-def _answers_or_none(measured):
-    return None if measured is None else list_answers(measured)
+    return [measured and list_answers(measured) for measured in mended]
 
 
 def judge_path(name, scene, path):

@@ -103,7 +103,7 @@ def recommand(scene, **changes):
     return replace(scene, motion=scene.motion.replace(**changes))
 
 
-def low_parallelogram(steps=8, **changes):
+def low_parallelogram():
     """Return a parallelogram below its ground's line, beyond a change point.
 
     The assembly is "open", and the sine between bars 3 and 4 is negative all the way:
@@ -113,13 +113,12 @@ def low_parallelogram(steps=8, **changes):
     ground_angle = 0.2
     linkage = replace(uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
     start, stop = np.radians([200.0, 340.0]) + ground_angle
-    parts = {
-        "linkage": linkage,
-        "motion": Motion(Sweep(start, stop, steps), 6.0),
-        "effects": (Gravity(),),
-        "title": "parallelogram below its ground",
-    }
-    return Scene(**{**parts, **changes})
+    return Scene(
+        linkage,
+        Motion(Sweep(start, stop, 8), 6.0),
+        effects=(Gravity(),),
+        title="parallelogram below its ground",
+    )
 
 
 def thesis(theta_2=None):

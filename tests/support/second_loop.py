@@ -23,7 +23,7 @@ class LoopSettings:
     """Settings of MuJoCo, in the words of its documentation."""
 
     steps_per_revolution: float
-    integrator: str = "RK4"
+    integrator: str
     solref_steps: float | None = None
     """solref[0] in timesteps; None leaves solref, solimp and solver to MuJoCo."""
     impedance: float = 0.9999

@@ -57,10 +57,10 @@ ENTRIES = {
 READ = {"theta_3", "theta_4", "torque", *PIN_FORCES}
 
 
-def ask_position(problem="crank_rocker", **changes):
+def ask_position(problem="crank_rocker"):
     stated = read_problem(PROBLEMS / f"{problem}.json")
     scene = protocol.scene_from_json(stated["scene"])
-    return protocol.command_from_json(scene, {**stated["command"], **changes})
+    return protocol.command_from_json(scene, stated["command"])
 
 
 def find_errors(simulator, **setting):
