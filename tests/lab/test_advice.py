@@ -22,23 +22,14 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
     assert case.met and case.cheap, case
 
 
-@pytest.fixture
-def measured(monkeypatch):
-    """Numbers of the cases that are measured: each is met at little more cost."""
-    numbers = []
-
-    def measure(seed, index, costs):
-        numbers.append(index)
-        return advice.AdviceCase(index, 1e-3, True, 5e-4, 20.0, 19.0)
-
-    monkeypatch.setattr(advice, "measure_case", measure)
-    monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
-    return numbers
-
-
 # Wilson: n of n met are at least n/(n + 1.96^2) at 95 %
 @pytest.mark.slow
-@pytest.mark.usefixtures("measured")
 @pytest.mark.parametrize(("count", "decided"), [(72, FAILED), (73, HOLDS)])
-def test_few_cases_cannot_tell_how_often_the_advice_is_met(count, decided, tmp_path):
+def test_few_cases_cannot_tell_how_often_the_advice_is_met(
+    count, decided, tmp_path, monkeypatch
+):
+    """Each case is met at little more cost than the cheapest."""
+    case = advice.AdviceCase(0, 1e-3, True, 5e-4, 20.0, 19.0)
+    monkeypatch.setattr(advice, "measure_case", lambda *_: case)
+    monkeypatch.setattr(advice, "time_relative_costs", lambda setup: {})
     assert ended(["advice", "--count", str(count), "--out", str(tmp_path)]) == decided

@@ -22,17 +22,12 @@ ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    """Counts at which the times mean nothing, but everything runs."""
-    monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
-    for name, count in (("LEAST_POSITIONS", 1), ("MOST_LOOPED", 10)):
-        monkeypatch.setattr(contenders, name, count)
-
-
 @pytest.mark.slow
-@pytest.mark.usefixtures("quick")
-def test_every_limit_is_of_a_row_that_is_measured(tmp_path):
+def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
+    """At counts at which the times mean nothing, but everything runs."""
+    monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
+    monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
+    monkeypatch.setattr(contenders, "MOST_LOOPED", 10)
     measured = bench.measure_speed(1000, 10_000, 1)
     assert bench.SPEED_LIMITS.keys() - measured.not_run.keys() <= measured.rows.keys()
     numbers = [
@@ -105,28 +100,17 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch):
         ).all(), name
 
 
-@pytest.fixture
-def run_bench(monkeypatch):
-    """Return a function that runs the command with these rows."""
-
-    def run(rows, not_run=()):
-        measured = bench.Measured(rows, {}, {}, dict(not_run))
-        monkeypatch.setattr(bench, "measure_speed", lambda *_: measured)
-        for variable in bench.ONE_THREAD:
-            monkeypatch.setenv(variable, "1")
-        done = CliRunner().invoke(bench.bench, standalone_mode=False)
-        return done.return_value, done.output
-
-    return run
-
-
 @pytest.mark.parametrize("name", bench.SPEED_LIMITS)
 @pytest.mark.parametrize("factor", [math.nan, 1.01, 1.0])
-def test_what_is_beyond_its_limit_fails_with_the_reason(name, factor, run_bench):
+def test_what_is_beyond_its_limit_fails_with_the_reason(name, factor, monkeypatch):
     rows = {what: limit.bound for what, limit in bench.SPEED_LIMITS.items()}
     rows["all, 1000 positions"] = 100.0
     limit = bench.SPEED_LIMITS[name]
     rows[name] *= 1.0 / factor if limit.sign == ">=" else factor
-    ended, output = run_bench(rows)
-    assert ended == (HOLDS if factor == 1.0 else FAILED)
-    assert (f"fails: {name}: {limit.reason}" in output) == (factor != 1.0)
+    measured = bench.Measured(rows, {}, {}, {})
+    monkeypatch.setattr(bench, "measure_speed", lambda *_: measured)
+    for variable in bench.ONE_THREAD:
+        monkeypatch.setenv(variable, "1")
+    done = CliRunner().invoke(bench.bench, standalone_mode=False)
+    assert done.return_value == (HOLDS if factor == 1.0 else FAILED)
+    assert (f"fails: {name}: {limit.reason}" in done.output) == (factor != 1.0)
