@@ -57,7 +57,6 @@ def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
 
 
 ALWAYS_WRONG = (5j, [[1, 2], [3]], np.zeros((3, 3)), object())
-TEXTS = ("", ".", "no/such", "1", ["1", "2"])
 WRONG = (
     *ALWAYS_WRONG,
     None,
@@ -66,7 +65,11 @@ WRONG = (
     -1,
     10**400,
     Decimal(1),
-    *TEXTS,
+    "",
+    ".",
+    "no/such",
+    "1",
+    ["1", "2"],
     (),
     {},
     {"m": 1},

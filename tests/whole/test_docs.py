@@ -39,17 +39,18 @@ PAGES = [*(ROOT / f"{name}.md" for name in TOP), *sorted(DOCS.rglob("*.md"))]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
 
 
-def table_after(name, heading):
-    """Return the rows of a page's first table after some words, head apart."""
-    table = read(name).partition(heading)[2].partition("\n\n")[0]
-    return table.splitlines()[2:]
+def first_column(name, heading):
+    """Return the first cells of a page's first table after some words, head apart."""
+    table = read(f"docs/{name}.md").partition(heading)[2].partition("\n\n")[0]
+    return "".join(row.split("|")[1] for row in table.splitlines()[2:])
 
 
 def commands_of(group):
     """Return the commands of a program by their names."""
     context = click.Context(group)
-    names = group.list_commands(context)
-    return {name: group.get_command(context, name) for name in names}
+    return {
+        name: group.get_command(context, name) for name in group.list_commands(context)
+    }
 
 
 def blocks(language, text):
@@ -208,9 +209,8 @@ def test_every_out_has_its_short_name():
     ],
 )
 def test_every_command_is_listed(page, heading, program):
-    rows = table_after(f"docs/{page}.md", heading)
-    first = "".join(row.split("|")[1] for row in rows)
-    assert sorted(re.findall("`([a-z-]+)[^`]*`", first)) == sorted(commands_of(program))
+    listed = re.findall("`([a-z-]+)[^`]*`", first_column(page, heading))
+    assert sorted(listed) == sorted(commands_of(program))
 
 
 def anchors(page):
@@ -290,8 +290,8 @@ def test_the_reference_of_the_commands_lists_every_option():
 def test_the_architecture_names_every_layer_and_no_other():
     uses = runpy.run_path(DOCS / "architecture.py")["uses"]
     for package in ("fourbar", "fourbar_validation"):
-        rows = table_after("docs/architecture.md", f"\n## {package}\n\n")
-        listed = re.findall(r"`(\w+)/?`", "".join(row.split("|")[1] for row in rows))
+        first = first_column("architecture", f"\n## {package}\n\n")
+        listed = re.findall(r"`(\w+)/?`", first)
         assert sorted(listed) == sorted(uses(package))
 
 

@@ -35,8 +35,6 @@ sys.stdin.readline()
 while True:
     pass
 """
-READING = "loops"
-GUEST = "guest"
 STARTING = b"spawn_main"
 """Word in the command line of a process that `multiprocessing` starts."""
 START_SECONDS = 1.0
@@ -48,7 +46,7 @@ KILLS = int(os.environ.get("KILLS", "1"))
 def start(what, folder, mark):
     """Start a command that would take minutes, with a mark in its environment."""
     harness = [sys.executable, "-m", "validation"]
-    if what == READING:
+    if what == "loops":
         file = folder / "endless.xml"
         file.write_text(ENDLESS_MJCF)
         line = [*harness, "loops", str(file)]
@@ -94,7 +92,7 @@ def leaving_nothing(mark):
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 10 * KILLS)
 @pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("what", [READING, GUEST])
+@pytest.mark.parametrize("what", ["loops", "guest"])
 def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
     """A terminal sends SIGINT to all processes of the command, while workers start."""
     by_terminal = ended_by == signal.SIGINT
@@ -105,7 +103,7 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
         mark = f"{tmp_path}/{what}/{moment}"
         process = start(what, tmp_path, mark)
         with leaving_nothing(mark):
-            started = STARTING if by_terminal or what == READING else b"busy.py"
+            started = STARTING if by_terminal or what == "loops" else b"busy.py"
             wait_until(partial(has_process, started, mark), 30.0)
             time.sleep(moment)
             (os.killpg if by_terminal else os.kill)(process.pid, ended_by)

@@ -82,25 +82,17 @@ def imported(path, *, types=False):
     With those of its types if wanted.
     """
     names = set()
-    tree = parse(path)
-    typing = (
-        set()
-        if types
-        else {
-            inner
-            for node in ast.walk(tree)
-            if isinstance(node, ast.If)
-            and isinstance(node.test, ast.Name)
-            and node.test.id == "TYPE_CHECKING"
-            for inner in ast.walk(node)
-        }
-    )
-    for node in set(ast.walk(tree)) - typing:
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.add(node.module)
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    nodes = {*ast.walk(parse(path))}
+    for node in [*nodes]:
+        match node:
+            case ast.If(ast.Name("TYPE_CHECKING")) if not types:
+                nodes -= {*ast.walk(node)}
+    for node in nodes:
+        match node:
+            case ast.Import(aliases):
+                names |= {alias.name for alias in aliases}
+            case ast.ImportFrom(str(module), aliases):
+                names |= {module, *(f"{module}.{alias.name}" for alias in aliases)}
     return names
 
 

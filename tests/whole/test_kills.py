@@ -215,12 +215,6 @@ def undisturbed(tmp_path):
     return guest, out
 
 
-def list_children(process):
-    """The processes that judge: no zombie, nor Python's tracker of resources."""
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-    return [pid for pid in map(int, children.split()) if runs(pid, b"spawn_main")]
-
-
 def runs(pid, word):
     """Return whether a process has a word in its line; one of them names its guest."""
     command = Path(f"/proc/{pid}/cmdline").read_bytes()
@@ -268,7 +262,9 @@ class Disturbed:
             return [process.pid]
         if victim == "guest":
             return [pid for pid in list_processes(self.mark) if runs(pid, b"plain.py")]
-        return list_children(process)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
+        # those that judge: no zombie, nor Python's tracker of resources
+        return [pid for pid in map(int, children.split()) if runs(pid, b"spawn_main")]
 
     def require_unfinished(self):
         """Hold that nothing passes for results; leave work for the next start."""

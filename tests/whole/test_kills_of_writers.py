@@ -22,7 +22,6 @@ from tests.support.runs import HERE, read_run, save_run
 pytestmark = [pytest.mark.slow, pytest.mark.posix]
 DRAFT = ".*.part"
 """Hidden files that a killed process may leave: nothing reads them."""
-MODELS = ROOT / "models"
 DIED = 77
 
 
@@ -87,7 +86,7 @@ def test_a_killed_accept_leaves_one_accepted_state_and_is_completed_by_another(
 
 def test_a_killed_workbench_leaves_a_whole_scene_file(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_bytes((MODELS / "crank_rocker.toml").read_bytes())
+    path.write_bytes((ROOT / "models/crank_rocker.toml").read_bytes())
     session = Session(path, tmp_path / "exports")
     session.do({"do": "set", "path": ["lengths", "input"], "value": "101 mm"})
     texts = {path.read_text("utf-8"), session.now.text}

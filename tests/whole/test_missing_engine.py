@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.checkout import ROOT, run_python
 
+pytestmark = pytest.mark.slow
 BLOCKER = """
 import os
 import sys
@@ -62,7 +63,6 @@ def without(library, folder, *arguments, **settings):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("library", ENGINES)
 def test_the_others_run_and_the_missing_named_with_the_reason(library, tmp_path):
     done = without(library, tmp_path)
@@ -82,7 +82,6 @@ def test_the_others_run_and_the_missing_named_with_the_reason(library, tmp_path)
     assert done.returncode == 3  # the environment, not the formulas
 
 
-@pytest.mark.slow
 def test_requested_by_name_nothing_is_run(tmp_path):
     done = without("mujoco", tmp_path, "--engines", "free-body,mujoco-inverse")
     reason = 'mujoco is not installed: pip install ".[validation]" in the checkout'
@@ -90,7 +89,6 @@ def test_requested_by_name_nothing_is_run(tmp_path):
     assert done.returncode == 3 and not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
 def test_an_engine_that_is_there_and_does_not_load_is_one_line(tmp_path):
     done = without("pinocchio", tmp_path, "--engines", "pinocchio-inverse", BROKEN="1")
     assert done.stderr == (

@@ -34,19 +34,18 @@ from tests.support.scenes import crank_rocker
 PAGE = read("docs/results.md")
 OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 """Of every engine, besides what it says of positions and of the linkage."""
-SHIPPED_RUN = find_baseline(ACCEPTED)
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
+    out = tmp_path_factory.mktemp("run") / "results"
     with pytest.MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         suite = Random(8, 1, tuple(DrawnType))
         plan = Plan(suite, choose_engines("free-body"), workers=1, drawn=False)
-        run(plan, folder / "results")
-    return folder
+        run(plan, out)
+    return out
 
 
 def test_every_column_is_described_with_its_type():
@@ -89,8 +88,8 @@ def test_every_quantity_of_a_scene_is_described(results):
     rows = [
         row
         for file in (
-            results / "results" / "results.csv",
-            SHIPPED_RUN / "results.parquet",
+            results / "results.csv",
+            find_baseline(ACCEPTED) / "results.parquet",
         )
         for row in read_columns(file)
     ]
@@ -114,11 +113,10 @@ def test_a_solution_has_the_shapes_of_the_table_and_no_other_quantity():
 def test_the_parquet_file_holds_the_rows_of_the_table(results):
     import pyarrow.parquet as pq
 
-    file = pq.ParquetFile(results / "results" / "results.parquet")
-    assert file.num_row_groups == 1  # of 100 000 rows each
+    parquet = results / "results.parquet"
+    assert pq.ParquetFile(parquet).num_row_groups == 1  # of 100 000 rows each
     kept, table = (
-        [*map(repr, read_columns(results / "results" / f"results.{form}"))]
-        for form in ("parquet", "csv")
+        [*map(repr, read_columns(file))] for file in (parquet, results / "results.csv")
     )
     assert kept == table
 
@@ -126,7 +124,7 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results):
 @pytest.fixture
 def beside_accepted(results, monkeypatch):
     """Where the page's programs stand: the run beside it is accepted."""
-    monkeypatch.chdir(results)
+    monkeypatch.chdir(results.parent)
     assert status(["accept", "results"]) == 0
 
 

@@ -14,7 +14,6 @@ from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
 from tests.support.checkout import ROOT
 
-MODELS = ROOT / "models"
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 
 
@@ -22,7 +21,7 @@ MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 def locked():
     """A folder that its user may read and not write, with a scene."""
     folder = Path(tempfile.mkdtemp())
-    shutil.copy(MODELS / "crank_rocker.toml", folder / "scene.toml")
+    shutil.copy(ROOT / "models/crank_rocker.toml", folder / "scene.toml")
     folder.chmod(0o555)
     yield folder
     folder.chmod(0o755)
@@ -98,8 +97,7 @@ def test_a_damaged_table_is_refused_or_read(tmp_path):
         child = os.fork()
         if child == 0:
             try:
-                for _row in open_run(tmp_path).rows():
-                    pass
+                list(open_run(tmp_path).rows())
                 os._exit(0)
             except InputError:
                 os._exit(2)
