@@ -1,7 +1,6 @@
 """The command `fourbar`; what a command needs is imported when it is called."""
 
 import sys
-from typing import Any
 
 import click
 
@@ -21,7 +20,7 @@ from fourbar.cli.export import (
     sdf_command,
     usd_command,
 )
-from fourbar.errors import InputError, run
+from fourbar.errors import run
 
 SECTIONS = {
     "Begin": (new, edit_command),
@@ -32,34 +31,8 @@ SECTIONS = {
 """Commands by what they are for, in the order of the help."""
 
 
-_OPTION_OF = {"position": "at"}
-"""Options that bear another name than the parameter in Python."""
-
-
 class SectionedGroup(click.Group):
     """A group whose help lists its commands in sections, each description whole."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; errors name its options as they are typed."""
-        try:
-            return super().invoke(ctx)
-        except InputError as error:
-            raise self._name_option(error, ctx.invoked_subcommand) from None
-
-    def _name_option(self, error: InputError, command: str | None) -> InputError:
-        """Return an error of a parameter in Python as that of the option it came by."""
-        if error.file is not None or command is None:
-            return error
-        key = _OPTION_OF.get(error.key, error.key)
-        for option in self.commands[command].params:
-            if isinstance(option, click.Option) and option.name == key:
-                name = max(option.opts, key=len)
-                # a flag has no value, and a position is typed in another form
-                if option.is_flag or key != error.key:
-                    return InputError(name, None, error.allowed)
-                # the numbers have the units of messages
-                error.args = (name + str(error).removeprefix(error.key),)
-        return error
 
     def format_commands(
         self,

@@ -574,9 +574,9 @@ analyze @gallery/excavator_bucket.toml --pressure 210 | did you mean "210 bar"?
 plot @crank_rocker.toml -o a.svg --at 12 | did you mean "12 deg"?
 plot @capabilities/stroke_input.toml -o a.svg --at 350 | did you mean "350 mm"?
 plot @crank_rocker.toml -o a.doc | a.doc
-plot @crank_rocker.toml -o a.svg --figure torque --dimensions | --dimensions: must
-plot @crank_rocker.toml -o a.svg --figure pie | --figure = 'pie': must be one of
-mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | --axis = (0.0, 0.0, 0.0): must
+plot @crank_rocker.toml -o a.svg --figure torque --dimensions | dimensions = True: must
+plot @crank_rocker.toml -o a.svg --figure pie | figure = 'pie': must be one of
+mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | axis = (0.0, 0.0, 0.0): must
 new --lengths 3 1 2 2 | name the new file once
 new a.toml --lengths 300 100 250 220 | --unit mm
 new a.toml --lengths 3m 1m 2m 0m | error: --lengths: output = '0m': must be a
