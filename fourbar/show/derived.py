@@ -12,6 +12,7 @@ import numpy as np
 
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     DERIVED_NAMES,
     SPRING_NAME,
@@ -19,6 +20,7 @@ from fourbar.quantities import (
     Array,
     find_derived,
 )
+from fourbar.scene import Scene
 from fourbar.show.acting import list_springs, measure_end_distance
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import shaking_force, shaking_moment
@@ -56,6 +58,13 @@ def derive(solution: Solution, name: str) -> Any:
             if of_spring[2] != "length":
                 values = np.asarray(spring.pull(values))
         return np.where(np.isfinite(values), values, np.nan)
+
+
+def list_point_names(scene: Scene) -> list[str]:
+    """List A, B, the mass centres of bars that have mass, and the scene's points."""
+    massive = [bar for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0]
+    points = [point.name for point in scene.points]
+    return ["A", "B", *(f"G{bar}" for bar in massive), *points]
 
 
 def list_derived_names(solution: Solution) -> list[str]:

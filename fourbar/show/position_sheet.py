@@ -12,7 +12,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import Array, find_derived
 from fourbar.show.change_point import find_limits
 from fourbar.show.columns import read_column
-from fourbar.show.derived import derive
+from fourbar.show.derived import derive, list_point_names
 from fourbar.show.shown_units import (
     POSITION_DIGITS,
     choose_unit,
@@ -99,15 +99,12 @@ class PositionSheet:
 
     def write_points(self) -> list[str]:
         """Write place, velocity and acceleration of pins, mass centres, points."""
-        centres = [
-            f"G{bar}" for bar in MOVING_BARS if self.scene.linkage.bar(bar).mass > 0.0
-        ]
         kinds = {"": "m"}
         if not self._rests():
             kinds |= {"v_": "m/s", "a_": "m/s^2"}
         rows = [_VECTOR_HEADS]
         for start, unit in kinds.items():
-            names = [f"{start}{n}" for n in ("A", "B", *centres, *self.solution.points)]
+            names = [f"{start}{name}" for name in list_point_names(self.scene)]
             rows += self._write_vectors(dict(zip(names, names, strict=True)), unit)
         return rows
 

@@ -15,6 +15,7 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.show.columns import read_column
+from fourbar.show.derived import list_point_names
 from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.labels import add_label
@@ -38,7 +39,7 @@ from fourbar.show.plot.style import (
     write_labelled_quantity,
     write_plain,
 )
-from fourbar.show.plot.view import View, collect_point_vectors
+from fourbar.show.plot.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -242,8 +243,8 @@ def _list_point_sizes(letter: str, title: str, view: View) -> Chart:
     colours = {"A": BAR_COLOURS[2], "B": BAR_COLOURS[4]}
     colours |= {f"G{bar}": BAR_COLOURS[bar] for bar in MOVING_BARS}
     looks = {}
-    names = collect_point_vectors(view.scene, view.sweep, letter)
-    for name, dashes in zip(names, cycle(("-", "--", "-.", ":")), strict=False):
+    all_dashes = cycle(("-", "--", "-.", ":"))
+    for name, dashes in zip(list_point_names(view.scene), all_dashes, strict=False):
         looks[name] = (
             f"{letter}_{name}",
             {

@@ -323,7 +323,7 @@ def draw_centres(axes: "Axes", view: View) -> None:
     for name, colour, dashes in (("I13", POINT, "-"), ("I24", INK, (0, (4, 1.5)))):
         line = {"ls": dashes, "lw": 1.2, "label": f"$I_{{{name[1:]}}}$"}
         for solution, look in ((view.sweep, line), (view.here, marked)):
-            path = derive(solution, name)
+            path = derive(solution, name) - view.scene.origin
             is_near = np.hypot(*path.T) <= reach
             near = np.where(is_near[:, None], path, np.nan)
             _draw_paths(axes, view, [(near, {"color": colour} | look)])

@@ -24,6 +24,7 @@ from fourbar.linkage import (
     list_declared,
 )
 from fourbar.scene import Scene
+from fourbar.show.derived import derive, list_point_names
 from fourbar.show.plot.curves import choose_limit
 from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.style import (
@@ -34,7 +35,7 @@ from fourbar.show.plot.style import (
     plot_points,
     write_pin_name,
 )
-from fourbar.show.plot.view import DrawingPlane, View, collect_point_vectors
+from fourbar.show.plot.view import DrawingPlane, View
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -391,14 +392,12 @@ def draw_vectors(axes: "Axes", view: View, solution: Solution, index: int) -> No
     """
     plane = view.plane
     for letter, (colour, label) in _ARROWS.items():
-        of_sweep = collect_point_vectors(view.scene, view.sweep, letter)
-        sizes = [np.hypot(*values.T) for values in of_sweep.values()]
+        names = list_point_names(view.scene)
+        sizes = [np.hypot(*derive(view.sweep, f"{letter}_{name}").T) for name in names]
         top = choose_limit(sizes) or largest_magnitude(*sizes)
-        vectors = collect_point_vectors(view.scene, solution, letter)
-        places = vars(solution) | solution.points
-        for name, values in vectors.items():
-            foot = plane.place(complex(*places[name][index]))
-            shaft = complex(*values[index])
+        for name in names:
+            foot = plane.factor * complex(*derive(solution, name)[index])
+            shaft = complex(*derive(solution, f"{letter}_{name}")[index])
             if shaft:
                 shaft *= LONGEST_ARROW * plane.size / max(abs(shaft), top)
             draw_arrow(axes, foot, foot + shaft, colour)

@@ -256,22 +256,6 @@ def list_limits(scene: Scene) -> list[tuple[str, tuple[LimitPosition, ...]]]:
     return found
 
 
-def collect_point_vectors(
-    scene: Scene,
-    solution: Solution,
-    letter: str,
-) -> dict[str, Array]:
-    """Collect velocities ("v") or accelerations ("a") of points.
-
-    The points are A, B, mass centres of bars that have mass, and the scene's own.
-    """
-    massive = [bar for bar in MOVING_BARS if scene.linkage.bar(bar).mass > 0.0]
-    drawn = ["A", "B", *(f"G{bar}" for bar in massive)]
-    vectors = {name: getattr(solution, f"{letter}_{name}") for name in drawn}
-    vectors |= solution.velocity if letter == "v" else solution.acceleration
-    return {name: values for name, values in vectors.items() if values is not None}
-
-
 def is_over_time(scene: Scene) -> bool:
     """Return True if the motion is one through time: released, or by a law."""
     return scene.motion.free is not None or scene.motion.law is not None

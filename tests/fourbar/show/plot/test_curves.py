@@ -133,3 +133,12 @@ def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s
     drawn = list_lines("coupler", scene)
     assert [name for name in drawn if name[0] != "_"] == ["$A$", "$B$", "P"]
     assert join(drawn["P"]) == approx(path)
+
+
+def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
+    scene = loads(COORDINATES)
+    assert any(scene.origin)
+    places = join(derive(make_view(scene).sweep, "I24"))
+    drawn = join(list_lines("centres", scene)["$I_{24}$"])
+    (first, *_) = drawn[np.isfinite(drawn)]
+    assert np.nanmin(np.abs(places - first)) < 1e-9
