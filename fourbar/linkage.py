@@ -376,35 +376,6 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     return require(key, size, unit, bound), require(key, other, second, of_second)
 
 
-class ListedNumber(NamedTuple):
-    """Number of a description, by the end of its key and the attributes to it."""
-
-    key: str
-    path: tuple[str | int, ...]
-    unit: str
-    bound: str
-
-
-def list_numbers(description: Any) -> list[ListedNumber]:
-    """List the numbers that a description declares, those of a pair one by one.
-
-    A description whose numbers stand under other keys lists them itself.
-    """
-    if hasattr(description, "list_numbers"):
-        listed: list[ListedNumber] = description.list_numbers()
-        return listed
-    numbers = []
-    for name, by in description.numbers.items():
-        key_of_field = by.key or name
-        if not by.pair:
-            numbers.append(ListedNumber(key_of_field, (name,), by.unit, by.bound))
-            continue
-        for index, unit_and_bound in enumerate(zip(by.units, by.bounds, strict=True)):
-            key = f"{key_of_field}.{index}"
-            numbers.append(ListedNumber(key, (name, index), *unit_and_bound))
-    return numbers
-
-
 Description = TypeVar("Description")
 
 

@@ -14,7 +14,7 @@ from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
-from fourbar.linkage import PINS, FourBar, ListedNumber, require
+from fourbar.linkage import PINS, FourBar, require
 from fourbar.quantities import Array
 
 Joints = tuple[float, float, float]
@@ -471,18 +471,6 @@ class PinRows(Effect):
     def field(self) -> str:
         """Name of the field that holds the rows."""
         return fields(self)[0].name  # type: ignore[arg-type]
-
-    def list_numbers(self) -> list[ListedNumber]:
-        """List the numbers of each row, by its pin."""
-        return [
-            ListedNumber(
-                f"{row[0]}.{name}".removesuffix("."),
-                (self.field, index, column),
-                *by[:2],
-            )
-            for index, row in enumerate(self.rows)
-            for column, (name, by) in enumerate(self.numbers.items(), 1)
-        ]
 
     @property
     def rows(self) -> tuple[tuple[Any, ...], ...]:

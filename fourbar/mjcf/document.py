@@ -10,7 +10,6 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from fourbar.effects import LinearDrive
-from fourbar.effects.effect import PinRows
 from fourbar.errors import (
     InputError,
     LimitError,
@@ -218,8 +217,6 @@ def _write_comments(
         notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
         for kind in ("opens", *_list_note_keys(scene, drive))
     ]
-    if reader == "genesis" and (names := _list_left_out_by_genesis(scene)):
-        lines.append(notes["genesis_without"].format(names=", ".join(names)))
     lines += numbers["instant"]
     if drive == "flywheel":
         lines += numbers["driven"]
@@ -253,24 +250,6 @@ def _list_note_keys(scene: Scene, drive: Drive) -> list[str]:
     elif scene.drive_bar != 2:
         kinds.append("elsewhere")
     return kinds
-
-
-def _list_left_out_by_genesis(scene: Scene) -> list[str]:
-    """List the loads and effects that Genesis leaves out.
-
-    Examples are springs, effects at B, and the rest angles of torsion springs.
-    """
-    names = ["loads"] if scene.loads else []
-    for effect in scene.effects:
-        key = effect.key
-        if key == "springs":
-            names.append(key)
-        pins = {pin for pin, *_ in effect.rows} if isinstance(effect, PinRows) else {}
-        if "B" in pins:
-            names.append(f"{key} at B")
-        if key == "torsion" and {*pins} - {"B"}:
-            names.append("rest angles of torsion (it rests as assembled)")
-    return names
 
 
 def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:

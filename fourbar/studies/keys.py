@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects.effect import PinRows
 from fourbar.effects.place import At, Place
 from fourbar.errors import (
     InputError,
@@ -34,7 +35,6 @@ from fourbar.linkage import (
     copy_with,
     is_within,
     list_declared,
-    list_numbers,
 )
 from fourbar.scene import Scene
 from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
@@ -106,13 +106,28 @@ def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
 
 
 def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, SceneNumber]:
-    """List the entries of the numbers that a description, or its class, states."""
+    """List the entries of the numbers that a description, or its class, states.
+
+    Those of a pair are listed one by one, and those of each pin by its name.
+    """
     entries = dict[str, SceneNumber]()
-    for number in list_numbers(described):
-        name = number.path[0]
-        if isinstance(described, type) or getattr(described, str(name)) is not None:
-            place = (*path, *number.path)
-            entries[f"{key}.{number.key}"] = SceneNumber(place, *number[2:])
+    if isinstance(described, PinRows):
+        for index, (pin, *_) in enumerate(described.rows):
+            for column, (name, by) in enumerate(described.numbers.items(), 1):
+                place = (*path, described.field, index, column)
+                of_pin = f"{key}.{pin}.{name}".rstrip(".")
+                entries[of_pin] = SceneNumber(place, by.unit, by.bound)
+        return entries
+    for name, by in described.numbers.items():
+        if not isinstance(described, type) and getattr(described, name) is None:
+            continue
+        stated = f"{key}.{by.key or name}"
+        place = (*path, name)
+        if by.pair:
+            for index, declared in enumerate(zip(by.units, by.bounds, strict=True)):
+                entries[f"{stated}.{index}"] = SceneNumber((*place, index), *declared)
+        else:
+            entries[stated] = SceneNumber(place, by.unit, by.bound)
     return entries
 
 

@@ -205,7 +205,7 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
     if (overlap := find_overlap(arrays.keys())) is not None:
         length, pin = overlap
         allowed = f"follows from {pin}, which varies too: vary one of them"
-        raise InputError(length, _shorten_for_line(values[length]), allowed)
+        raise InputError(length, values[length], allowed)
     angles = _read_angles(scene, arrays, theta)
     members = {key: array.size for key, array in arrays.items() if key != theta}
     members[theta] = angles.shape[0]
@@ -272,14 +272,14 @@ def _list_commands(
 def _read_members(key: str, value: Any, keys: list[str]) -> Array:
     """Return the array given for a key, (m,) or (1,); the angles as they are."""
     if key not in keys:
-        raise refuse_key(key, _shorten_for_line(value), keys)
+        raise refuse_key(key, value, keys)
     try:
         array = np.asarray(convert_to_unit(key, value, find_unit_of_key(key) or "1"))
     except ValueError:  # rows of different lengths
         raise InputError(key, "a ragged list", "must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or array.size == 0:
         allowed = "must be an array of numbers, at least one"
-        raise InputError(key, _shorten_for_line(value), allowed)
+        raise InputError(key, value, allowed)
     may_be, most = "(m,)", 1
     if key in COMMAND_KEYS:
         may_be, most = "(n,) or (m, n)", 2
@@ -287,12 +287,6 @@ def _read_members(key: str, value: Any, keys: list[str]) -> Array:
         allowed = f"must have the shape {may_be}"
         raise InputError(key, f"shape {array.shape}", allowed)
     return array.astype(float)
-
-
-def _shorten_for_line(value: Any) -> object:
-    if isinstance(value, np.ndarray):
-        return f"{type(value).__name__} of shape {value.shape}"
-    return value
 
 
 def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fourbar import Tolerance, save, solve, tolerances, uniform, vary
+from fourbar import Gravity, Tolerance, Viscous, save, solve, tolerances, uniform, vary
 from fourbar.files import dump, loads
+from fourbar.studies.keys import list_entries
 from tests.support.refusals import refused
 from tests.support.rows import read_rows
+from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 
 DRAWING = """\
@@ -217,3 +219,10 @@ def test_what_is_drawn_on_the_ground_stays_while_its_pins_move():
         for height in heights
     ]
     assert_allclose(solve(varied).drive_force, forces, rtol=1e-12)
+
+
+def test_a_number_has_the_key_and_the_bound_that_its_file_has():
+    effects = Gravity(), Viscous.at(A=0.1)
+    entries = list_entries(crank_rocker(effects=effects))
+    assert {"effects.gravity.0", "effects.gravity.1"} <= entries.keys()
+    assert entries["effects.viscous.A"].holds(np.array([-0.1, 0.0])).tolist() == [0, 1]
