@@ -248,7 +248,7 @@ def test_a_spring_pulls_in_a_release_from_between_its_instants():
     length = sqrt(0.1 - 0.06 * cos(1.1))  # at 1.1 rad
     effects = (
         Flywheel(0.01, 2),
-        Torsion((("O2", 1.0, 1.0, 0.0),)),
+        Torsion.at(O2=(1.0, 1.0, 0.0)),
         Springs((Spring(*ENDS, 1e-12, length),)),
     )
     motion = Motion(0.5, 0.0, free=Free(0.3, 3))

@@ -186,9 +186,6 @@ def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
     assert not (tmp_path / "page.html").exists()
 
 
-ROCKING = thesis(Sweep(radians(40), radians(50), 5))
-
-
 @pytest.mark.parametrize(
     "name, options, words",
     [
@@ -200,8 +197,9 @@ ROCKING = thesis(Sweep(radians(40), radians(50), 5))
 def test_what_cannot_be_shown_is_refused(name, options, words, tmp_path):
     with raises(InputError, match=words):
         animate.write_animation(crank_rocker(), tmp_path / name, **options)
+    apart = thesis(Sweep(radians(40), radians(50), 5))
     with raises(NotAssembledError, match="assembl"):
-        animate.write_animation(ROCKING, tmp_path / "a.html")
+        animate.write_animation(apart, tmp_path / "a.html")
     assert not list(tmp_path.iterdir())
 
 

@@ -93,7 +93,7 @@ def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second):
     """The bar that goes back at first turns forwards in the end."""
     law = Law((0.0, 0.2, 0.5, 1.0), (0.1, second, 3.7, 0.1 + tau), ends="periodic")
     assert (law.at(np.zeros(1))[1] > 0.0) == (second > 0.0)
-    damped = (fourbar.Viscous.at(O2=0.01),)
+    damped = (Viscous.at(O2=0.01),)
     duty = motor_duty(solve(crank_rocker(motion=Motion(law=law), effects=damped)))
     work = duty.energy_in - duty.energy_out
     # the difference of the energies has the roundings of the larger one
@@ -176,7 +176,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
 @pytest.mark.slow
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
-    torsion = fourbar.effects.Torsion((("A", 2.0, radians(86.0), 0.0),))
+    torsion = Torsion.at(A=(2.0, radians(86.0), 0.0))
     turn = Sweep(0.0, tau, 120)
     scene = crank_rocker(motion=Motion(turn, 1.0), effects=(torsion,))
     duty = motor_duty(solve(scene))

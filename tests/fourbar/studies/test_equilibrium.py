@@ -72,10 +72,7 @@ def crank_as_pendulum(*effects, loads=(), **motion):
     )
 
 
-GRID = TURN / POSITIONS_OF_A_BRANCH
-
-
-SAMPLE = 0.2 + 700.5 * GRID
+SAMPLE = 0.2 + 700.5 * TURN / POSITIONS_OF_A_BRANCH
 
 
 def pendulum_under_moment(excess):

@@ -66,11 +66,8 @@ TOUCH = 1.0
 """Boxes of texts may share this many pixels: a box is wider than its ink."""
 
 
-GALLERY = MODELS / "gallery"
-
-FULL_TURN = Sweep(0.0, 2 * pi, 360)
 CRANK_ROCKER = crank_rocker()
-THREE_ROCKERS = thesis(FULL_TURN)
+THREE_ROCKERS = thesis(Sweep(0.0, 2 * pi, 360))
 
 BETWEEN_CRANKS = LinearDrive(Place(2, (0.17, -1.1)), Place(4, (0.09, 0.7)))
 
@@ -229,7 +226,7 @@ def test_no_texts_overlap_whatever_moves(scene, name):
     ),
 )
 def test_no_text_stands_on_a_support_or_a_bar(name, dimensions):
-    scene = load(GALLERY / f"{name}.toml")
+    scene = load(MODELS / f"gallery/{name}.toml")
     figure = draw_figure(scene, "linkage", dimensions=dimensions).figure
     (axes,) = figure.axes
     paths = [(x, x.get_path().transformed(axes.transData)) for x in axes.lines]
