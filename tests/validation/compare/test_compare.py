@@ -17,27 +17,26 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, K
 ALLOWED = 1e-14
 
 
-def judge_quantity(*error, predicted=None, **changes):
+def judge_quantity(
+    *error,
+    predicted=None,
+    allowed=ALLOWED,
+    relative=True,
+    cancellation=1.0,
+    tolerance=EQUIVALENCE,
+):
     """Judge the errors of a quantity."""
-    n = len(error)
-    parts = {
-        "allowed": np.full(n, ALLOWED),
-        "relative": np.ones(n, dtype=bool),
-        "mask": np.ones(n, dtype=bool),
-        "cancellation": np.ones(n),
-        "tolerance": EQUIVALENCE,
-        **changes,
-    }
-    ones = np.ones(n)
+    ones = np.ones(len(error))
+    mask = ones.astype(bool)
     errors = Errors(
         np.array(error),
-        parts["allowed"],
-        Scale(ones, parts["cancellation"], np.zeros(n, dtype=bool)),
-        parts["relative"],
+        allowed * ones,
+        Scale(ones, cancellation * ones, ~mask),
+        mask & relative,
         ones,
-        parts["mask"],
-        parts["tolerance"],
-        np.full(n, np.nan),
+        mask,
+        tolerance,
+        np.nan * ones,
     )
     return judge_errors(errors, predicted)
 
@@ -56,12 +55,7 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
     predicted, verdict, allowed
 ):
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
-    worst = judge_quantity(
-        1e-15,
-        1e-12,
-        0.0,
-        predicted=expected,
-    )
+    worst = judge_quantity(1e-15, 1e-12, 0.0, predicted=expected)
     assert (worst.position, worst.verdict) == (1, verdict)
     assert worst.allowed == pytest.approx(allowed, abs=0)
 
@@ -70,7 +64,7 @@ def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
     worst = judge_quantity(1e-15, 9e-15, 0.0)
     assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
     for allowed, verdict in ((0.9, FAILS), (1.0, UNDECIDED)):
-        worst = judge_quantity(np.nan, 0.0, allowed=np.full(2, allowed))
+        worst = judge_quantity(np.nan, 0.0, allowed=allowed)
         assert (worst.position, worst.verdict) == (0, verdict)
         assert worst.reason.startswith("NaN") == (verdict == FAILS)
 
@@ -91,13 +85,8 @@ def test_a_position_at_which_too_much_is_allowed_is_undecided(
     tolerance = replace(EQUIVALENCE, factor=declared)
 
     def judge(*allowed):
-        worst = judge_quantity(
-            1.0,
-            0.0,
-            allowed=np.array(allowed),
-            cancellation=np.full(2, 123.0),
-            tolerance=tolerance,
-        )
+        held = {"cancellation": 123.0, "tolerance": tolerance}
+        worst = judge_quantity(1.0, 0.0, allowed=np.array(allowed), **held)
         assert "the terms cancel 1.2e+02-fold" in worst.reason
         return worst.verdict, worst.decided
 
@@ -108,7 +97,7 @@ def test_a_position_at_which_too_much_is_allowed_is_undecided(
 
 def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_own():
     """At a scale of 0 a prediction of 2 is 2 N and not twice the value."""
-    none = {"allowed": np.zeros(1), "relative": np.zeros(1, dtype=bool)}
+    none = {"allowed": 0.0, "relative": False}
     for changes, verdict in ((none, DEGRADED), ({}, UNDECIDED)):
         worst = judge_quantity(1.0, predicted=np.array([2.0]), **changes)
         assert worst.verdict == verdict

@@ -6,12 +6,12 @@ import pytest
 
 import fourbar
 from fourbar_validation.engines.guests import read_guests
+from fourbar_validation.places import MODELS
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
-from tests.whole.test_imports import ROOT
 
-MODELS = sorted(path.stem for path in (ROOT / "models").glob("*.toml"))
+FILES = sorted(MODELS.glob("*.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +36,9 @@ def check(engine, scene):
     return True
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_it_agrees_on_every_model(engine, name):
-    assert check(engine, fourbar.load(ROOT / "models" / f"{name}.toml"))
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_it_agrees_on_every_model(engine, file):
+    assert check(engine, fourbar.load(file))
 
 
 def test_it_is_allowed_the_error_that_is_predicted_for_the_position(engine):

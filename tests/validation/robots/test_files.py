@@ -9,10 +9,10 @@ from fourbar_validation.engines.mujoco.robots.compiled import (
     compile_robot,
     list_unknown_parts,
 )
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots import files
 from fourbar_validation.robots.files import read_robot
 from tests.support.rows import read_rows
-from tests.whole.test_imports import ROOT
 
 TETRAHEDRON = (
     "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -148,7 +148,7 @@ def test_a_message_begins_with_the_format_of_the_file(
 ):
     path = tmp_path / name
     path.write_text(text)
-    scene = str(ROOT / "models" / "crank_rocker.toml")
+    scene = str(MODELS / "crank_rocker.toml")
     out = str(tmp_path / "out")
     assert status(["check-mjcf", scene, str(path), "--out", out]) == BAD_INPUT
     message = capsys.readouterr().err.strip().splitlines()[-1]

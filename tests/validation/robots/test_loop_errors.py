@@ -1,17 +1,16 @@
 """check-mjcf and advise on a robot's file: what is printed, and the exit status."""
 
-from pathlib import Path
-
 import pytest
 from click.testing import CliRunner
 
 from fourbar_validation.advise.advise import advise_command as advise
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.check_mjcf import check_mjcf_command as check_mjcf
 from fourbar_validation.robots.loops import loops_command as loops
 from tests.support.robots import FOOT_PARALLELOGRAM
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
-FOOT = str(Path(__file__).parents[3] / "models" / "robots" / "biped_foot.xml")
+FOOT = str(MODELS / "robots" / "biped_foot.xml")
 
 
 def call(command, *arguments):

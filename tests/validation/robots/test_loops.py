@@ -7,11 +7,11 @@ import pytest
 from click.testing import CliRunner
 
 import fourbar
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.loops import loops_command
 from fourbar_validation.robots.options import read_pose
-from tests.whole.test_imports import ROOT
 
-MODELS = ROOT / "models" / "robots"
+ROBOTS = MODELS / "robots"
 
 
 def call(*arguments):
@@ -26,7 +26,7 @@ def unfold(printed):
 
 @pytest.mark.slow
 def test_a_line_for_each_closure():
-    result = call(MODELS / "gripper.xml")
+    result = call(ROBOTS / "gripper.xml")
     assert result.exception is None
     assert max(map(len, result.output.splitlines())) <= 80
     right, left = unfold(result.output)
@@ -41,7 +41,7 @@ def test_a_line_for_each_closure():
 
 @pytest.mark.slow
 def test_the_gap_is_that_of_the_stated_pose():
-    result = call(MODELS / "biped_foot.xml", "--pose", "crank=20deg,knee=30deg")
+    result = call(ROBOTS / "biped_foot.xml", "--pose", "crank=20deg,knee=30deg")
     line, note = unfold(result.output)
     assert line.startswith("rod: connect; ground ankle_frame; hinges rod, crank, ankle")
     # the crank turned by 20 deg carries the rod's end along: 2 . 0.31905 m sin(10 deg)
@@ -64,7 +64,7 @@ def test_a_pose_is_read_from_pairs():
 def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
     out = tmp_path / "finger.toml"
     loop = "--loop", "right_finger-right_follower"
-    result = call(MODELS / "gripper.xml", *loop, "-o", out, "--speed", "60 rpm")
+    result = call(ROBOTS / "gripper.xml", *loop, "-o", out, "--speed", "60 rpm")
     assert result.exception is None
     assert result.output.splitlines()[-1] == f"written to {out}"
     text = out.read_text()
@@ -79,7 +79,7 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
 def test_meshes_that_are_missing_are_counted_in_the_scene(tmp_path):
     geoms = "".join(f'<geom type="mesh" mesh="m{i}"/>' for i in range(150))
     meshes = "".join(f'<mesh name="m{i}" file="m{i}.stl"/>' for i in range(150))
-    text = (MODELS / "biped_foot.xml").read_text(encoding="utf-8")
+    text = (ROBOTS / "biped_foot.xml").read_text(encoding="utf-8")
     text = text.replace("<worldbody>", f"<asset>{meshes}</asset><worldbody>{geoms}", 1)
     robot = tmp_path / "foot.xml"
     robot.write_text(text, encoding="utf-8")
@@ -92,5 +92,5 @@ def test_meshes_that_are_missing_are_counted_in_the_scene(tmp_path):
 
 
 def test_a_speed_without_a_scene_is_refused():
-    refused = call(MODELS / "gripper.xml", "--speed", "1")
+    refused = call(ROBOTS / "gripper.xml", "--speed", "1")
     assert "--speed goes with -o" in str(refused.exception)

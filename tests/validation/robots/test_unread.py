@@ -2,11 +2,11 @@
 
 import fourbar
 from fourbar.mjcf import write_mjcf
+from fourbar_validation.places import MODELS
 from fourbar_validation.robots.unread import list_unread
 from tests.support.rows import read_rows
-from tests.whole.test_imports import ROOT
 
-GENERATED = write_mjcf(fourbar.load(ROOT / "models" / "crank_rocker.toml"))
+GENERATED = write_mjcf(fourbar.load(MODELS / "crank_rocker.toml"))
 UNREAD = read_rows("""
 joint name="O4" | joint name="O4" actuatorfrcrange="-1 1" | joint actuatorfrcrange
 island="disable" | island="disable" eulerdamp="disable" | flag eulerdamp

@@ -500,6 +500,10 @@ def with_effects(*effects):
     return replace(SCENE, effects=effects)
 
 
+def with_springs(*springs):
+    return with_effects(Springs(springs))
+
+
 def with_torsion(*numbers):
     """Return the scene with torsion springs: stiffness, rest angle and preload."""
     springs = zip(("O2", "O4"), numbers, strict=True)
@@ -515,6 +519,7 @@ def with_forces(angle, moment, **table):
 
 PLACE = (0.05, 1.0)
 TABLE = {"table": fourbar.Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
+DRAWN = replace(SPRING, preload=-4.0)
 PULLING, PUSHING = (replace(SLACK, acts=acts) for acts in ("pull", "push"))
 SLIDING = replace(SCENE, motion=Motion(Sweep(3.5, 5.0, 12), 10.0, 5.0))
 (SLIP,) = {
@@ -559,12 +564,12 @@ OTHER_SCENES = {
         replace(RUBBED, linkage=with_bars(**LIGHT).linkage, loads=WEIGHTS),
     ),
     "effects.springs.*.length left out": (
-        with_effects(Springs((PULLING, PUSHING))),
-        with_effects(Springs((replace(PULLING, length=0.0, acts=None),))),
+        with_springs(PULLING, PUSHING),
+        with_springs(replace(PULLING, length=0.0, acts=None)),
     ),
     "effects.springs.0.stiffness left out": (
-        with_effects(Springs((replace(SPRING, preload=-4.0),))),
-        with_effects(Springs((replace(SPRING, stiffness=0.0, preload=-4.0),))),
+        with_springs(DRAWN),
+        with_springs(replace(DRAWN, stiffness=0.0)),
     ),
     "effects.torsion.O2.stiffness 1.3 times ours (fitted)": (
         with_effects(Torsion((("O2", 2.0, 1.0, 0.3),))),
@@ -615,12 +620,12 @@ OTHER_SCENES = {
         with_torsion((2.0, 0.4, 0.5 + 4.0 * math.pi), (1.0, 1.0, 2.0 * math.pi)),
     ),
     "effects.springs.0.length 1.3 times ours (fitted)": (
-        with_effects(Springs((replace(SPRING, preload=-4.0),))),
-        with_effects(Springs((replace(SPRING, preload=-4.0, length=0.13),))),
+        with_springs(DRAWN),
+        with_springs(replace(DRAWN, length=0.13)),
     ),
     "the springs act both ways": (
-        with_effects(Springs((PULLING,))),
-        with_effects(Springs((SLACK,))),
+        with_springs(PULLING),
+        with_springs(SLACK),
     ),
     "the flywheel is on bar 4": (
         with_effects(Flywheel(0.3)),

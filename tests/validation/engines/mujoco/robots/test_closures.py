@@ -107,10 +107,12 @@ FIVE_BAR = """
 """
 
 
+ONE_MOTOR = FIVE_BAR.format(more="")
+
+
 def test_five_hinges_are_a_four_bar_once_one_is_held():
-    text = FIVE_BAR.format(more="")
-    loop = loop_of(text, held=("d",))
-    model = mujoco.MjModel.from_xml_string(text)
+    loop = loop_of(ONE_MOTOR, held=("d",))
+    model = mujoco.MjModel.from_xml_string(ONE_MOTOR)
     assert loop.lengths == approx(
         (0.05, 0.1, math.hypot(0.05, 0.08), math.hypot(0.0, 0.18)),
         abs=1e-12,
@@ -119,14 +121,12 @@ def test_five_hinges_are_a_four_bar_once_one_is_held():
     assert model.joint("d").id in loop.held
 
 
-SPRUNG = FIVE_BAR.format(more="").replace(
-    'joint name="c"', 'joint name="c" stiffness="2"'
-)
+SPRUNG = ONE_MOTOR.replace('joint name="c"', 'joint name="c" stiffness="2"')
 TWO_MOTORS = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
 UNNAMED = TWO_MOTORS.replace('name="one" ', "")
-NO_NAME = FIVE_BAR.format(more="").replace('<joint name="d"', "<joint")
+NO_NAME = ONE_MOTOR.replace('<joint name="d"', "<joint")
 
-COAXIAL = FIVE_BAR.format(more="").replace('pos="0.02 0 0.12"', 'pos="0 0 0"')
+COAXIAL = ONE_MOTOR.replace('pos="0.02 0 0.12"', 'pos="0 0 0"')
 TWICE_COAXIAL = COAXIAL.replace('pos="0 0 0.1"', 'pos="0 0 0"')
 
 
@@ -134,7 +134,7 @@ TWICE_COAXIAL = COAXIAL.replace('pos="0 0 0.1"', 'pos="0 0 0"')
     "text, words",
     [
         (
-            FIVE_BAR.format(more=""),
+            ONE_MOTOR,
             "5 hinges and 2 freedoms; --hold b (or c or d)",
         ),
         (ADAPTIVE, "--hold spring_link (or "),
