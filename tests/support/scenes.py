@@ -55,6 +55,17 @@ def find_angle(side, first, second):
     return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
+def meet_circles(near, far, r_near, r_far, side=1.0):
+    """Return the point at two distances from two points, to the left of their line.
+
+    `side`: -1 to the right.
+    """
+    apart = np.abs(far - near)
+    along = (r_near**2 - r_far**2 + apart**2) / (2.0 * apart)
+    across = side * np.sqrt(r_near**2 - along**2)
+    return near + (far - near) / apart * (along + 1j * across)
+
+
 def bare(d, a, b, c, theta_1=0.0):
     """Make a linkage of bars without mass."""
     return FourBar(d, *(Bar(length) for length in (a, b, c)), ground_angle=theta_1)

@@ -18,7 +18,7 @@ from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
 from tests.support.rows import read_rows
-from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker, meet_circles
 
 SAME_PLACE = 1e-9
 """rad: a position by two circles and one by the formulas, 0.1 rad off a limit."""
@@ -32,10 +32,7 @@ def find_crank(scene, theta_4, side):
     """
     d, a, b, c = scene.linkage.lengths
     B = d * np.exp(1j * scene.linkage.ground_angle) + c * np.exp(1j * theta_4)
-    away = np.abs(B)
-    along = (a * a - b * b + away * away) / (2.0 * away)
-    across = side * np.sqrt(a * a - along * along)
-    return np.angle((along + 1j * across) * B / away)
+    return np.angle(meet_circles(0.0, B, a, b, side))
 
 
 def write(heading, *columns):

@@ -23,6 +23,7 @@ from tests.support.robots import (
     report_of,
 )
 from tests.support.rows import read_rows
+from tests.support.scenes import meet_circles
 from tests.validation.robots.test_files import TETRAHEDRON
 
 AGREES = 1e-9
@@ -34,17 +35,9 @@ DENSITY = 2700.0
 WIDTH, DEPTH = 0.02, 0.01
 
 
-def find_pin(near, far, r_near, r_far):
-    """Return the upper point at two distances from two points."""
-    apart = abs(far - near)
-    along = (r_near**2 - r_far**2 + apart**2) / (2.0 * apart)
-    up = math.sqrt(r_near**2 - along**2)
-    return near + (far - near) / apart * complex(along, up)
-
-
 START = math.radians(50.0)
 PIN_A = A * complex(math.cos(START), math.sin(START))
-PIN_B = find_pin(PIN_A, D + 0j, B, C)
+PIN_B = meet_circles(PIN_A, D, B, C)
 ROD = math.atan2((PIN_B - PIN_A).imag, (PIN_B - PIN_A).real)
 ROCKER = math.atan2(PIN_B.imag, PIN_B.real - D)
 

@@ -16,6 +16,7 @@ from pytest import approx, raises
 import fourbar
 from tests.support.robots import FOOT, GRIPPER, Planar, forward, read_scene
 from tests.support.rows import read_rows
+from tests.support.scenes import meet_circles
 
 
 def test_a_motor_counts_behind_its_gear():
@@ -106,13 +107,9 @@ def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, low,
     p = {name: complex(*place) for name, place in planar.pins.items()}
     turned = np.linspace(-math.tau, math.tau, 20001)
     at = p["A"] * np.exp(1j * turned)
-    to_o4 = p["O4"] - at
-    distance = abs(to_o4)
-    b, c = abs(p["B"] - p["A"]), abs(p["B"] - p["O4"])
-    # B is to the left of the line from A to O4
-    corner = np.arccos((b**2 + distance**2 - c**2) / (2.0 * b * distance))
-    along = to_o4 / distance * np.exp(1j * corner)
-    lines = {"A": along / np.exp(1j * turned), "O4": at + b * along - p["O4"]}
+    _, _, b, c = planar.lengths()
+    B = meet_circles(at, p["O4"], b, c)
+    lines = {"A": (B - at) / np.exp(1j * turned), "O4": B - p["O4"]}
     hinge = np.unwrap(np.angle(lines[pin])) if pin in lines else turned
     hinge = np.degrees(hinge - hinge[len(turned) // 2])
     outside = turned[(hinge < low) | (hinge > high)]

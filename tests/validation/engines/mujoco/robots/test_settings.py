@@ -26,6 +26,7 @@ from fourbar_validation.robots.loop_errors import (
     read_measure_options,
 )
 from tests.support.robots import measure, pose_loop
+from tests.support.scenes import meet_circles
 from tests.support.shares import slow_but
 
 FOOT = MODELS / "robots" / "biped_foot.xml"
@@ -97,10 +98,7 @@ ONE_STEP = 2e-3
 def bend(angle):
     """Return pins A and B of the leg at an angle of its crank, m."""
     pin = 0.2 * complex(math.cos(angle), math.sin(angle))
-    line = 0.3 - pin
-    along = (0.12**2 - 0.15**2 + abs(line) ** 2) / (2.0 * abs(line))
-    turn = complex(along, math.sqrt(0.12**2 - along**2)) / abs(line)
-    return pin, pin + line * turn
+    return pin, complex(meet_circles(pin, 0.3, 0.12, 0.15))
 
 
 def write_leg(sense):
