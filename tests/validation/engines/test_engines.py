@@ -36,7 +36,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import crank_rocker, find_angle, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING, scene
 
@@ -136,7 +136,7 @@ def answered(name, case, at=None):
 def at_limit(linkage, offset, branch=1):
     """A scene at an angle before bars 3 and 4 are stretched."""
     d, a, b, c = linkage.lengths
-    limit = math.acos((d * d + a * a - (b + c) ** 2) / (2.0 * d * a))
+    limit = find_angle(b + c, d, a)
     return Scene(linkage, Motion(limit - offset, 1.0, branch=branch))
 
 

@@ -34,7 +34,7 @@ from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.judge_engines import compare_answer
-from tests.support.scenes import ON_COUPLER, crank_rocker
+from tests.support.scenes import ON_COUPLER, crank_rocker, find_angle
 
 pytest.importorskip("flint")
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
@@ -116,7 +116,7 @@ def test_the_bound_of_the_angles_is_that_of_the_triangle(b, c, stretched):
         b,
         c,
     )
-    psi = math.acos((d * d + a * a - e * e) / (2.0 * d * a))
+    psi = find_angle(e, d, a)
     with mp.workprec(200):
         missed = mp.mpf(TOUCHING_MARGIN) * sum_lengths(linkage)
         B, C = mp.mpf(b), mp.mpf(c)

@@ -47,6 +47,7 @@ from tests.support.robots import (
     notes_of,
     read_scene,
 )
+from tests.support.scenes import find_angle
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
@@ -271,10 +272,9 @@ def test_a_pose_at_a_limit_of_the_output_tells_no_assembly_of_its_command(
 ):
     """Bars 2 and 3 are in line there, and not those of pin B."""
     ground, crank, coupler, rocker = BARE.linkage.lengths
-    reach = crank + coupler
-    cosine = (ground**2 + reach**2 - rocker**2) / (2.0 * ground * reach)
+    start = find_angle(rocker, ground, crank + coupler)
     scene = replace(BARE, effects=effects)
-    limit = replace(scene, motion=Motion(math.acos(cosine), 1.0))
+    limit = replace(scene, motion=Motion(start, 1.0))
     theta_4 = solve(limit, "position").theta_4[0] + np.linspace(0.1, 0.5, 5)
     said = measure_rocker(scene, limit, theta_4, branch)
     assert f"is closed onto the {branch} one" in said

@@ -35,6 +35,7 @@ from fourbar_validation.robots.report import (
 )
 from tests.support.robots import FINGER, measure_all
 from tests.support.rows import read_rows
+from tests.support.scenes import find_angle
 
 SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
 """A parallelogram, in line at 0 and 180 deg."""
@@ -142,7 +143,7 @@ def describe(scene, joint):
 def test_a_limit_of_the_bar_that_is_driven_is_told():
     """Driven by its output, whose limits are those of 2 and 3 in line, near 3 + 10."""
     lengths = uniform(9.0, 3.0, 10.0, 8.0)
-    limit = math.pi - math.acos((9.0**2 + 8.0**2 - 13.0**2) / (2.0 * 9.0 * 8.0))
+    limit = math.pi - find_angle(13.0, 9.0, 8.0)
     scene = Scene(lengths, Motion(theta_4=2.0, omega_4=1.0))
     told = describe(scene, limit + math.radians(2.0))
     assert told == "2 deg from a limit position, beyond which the loop does not close"

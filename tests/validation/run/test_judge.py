@@ -30,7 +30,7 @@ from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, find_angle
 
 
 class Echo:
@@ -160,7 +160,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     """At the dead centre of bar 4, with dry friction at O4."""
     linkage = uniform(0.3, 0.1, 0.25, 0.22)
     d, a, b, c = linkage.lengths
-    psi = np.arccos((d * d + (a + b) ** 2 - c * c) / (2.0 * d * (a + b)))
+    psi = find_angle(c, d, a + b)
     motion = Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
     scene = Scene(linkage, motion, effects=(Friction.at(O4=0.5),))
     rows = rows_of(miss_the_reversal, scene)

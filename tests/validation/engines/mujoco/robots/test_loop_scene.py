@@ -16,7 +16,7 @@ from pytest import approx, raises
 import fourbar
 from tests.support.robots import FOOT, GRIPPER, Planar, forward, read_scene
 from tests.support.rows import read_rows
-from tests.support.scenes import meet_circles
+from tests.support.scenes import find_angle, meet_circles
 
 
 def test_a_motor_counts_behind_its_gear():
@@ -85,7 +85,7 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     d, a, b, c = rocker.lengths()
     assert a + d > b + c
     # it stops where coupler and output are in one line
-    most = math.acos((a * a + d * d - (b + c) ** 2) / (2.0 * a * d))
+    most = find_angle(b + c, a, d)
     width = find_width(read_scene(rocker.text()))
     assert width == approx(2.0 * most - 2.0 * math.radians(1.0))
 

@@ -26,7 +26,7 @@ from fourbar_validation.robots.loop_errors import (
     read_measure_options,
 )
 from tests.support.robots import measure, pose_loop
-from tests.support.scenes import meet_circles
+from tests.support.scenes import find_angle, meet_circles
 from tests.support.shares import slow_but
 
 FOOT = MODELS / "robots" / "biped_foot.xml"
@@ -88,7 +88,7 @@ def test_what_is_typed_reaches_the_error_that_was_wanted():
     assert again.error == approx(advice.best.error, rel=1e-3)
 
 
-LIMIT = math.acos((0.2**2 + 0.3**2 - (0.12 + 0.15) ** 2) / (2.0 * 0.2 * 0.3))
+LIMIT = find_angle(0.12 + 0.15, 0.2, 0.3)
 """rad; coupler and output are stretched there."""
 NEAR = math.radians(1.0)
 ONE_STEP = 2e-3
@@ -153,7 +153,7 @@ def test_states_beside_a_limit_decide_and_the_range_without_them_is_named():
     assert search(0, 8).find_range(stiff, 1e-12) is None
 
 
-TURN = math.acos((0.32**2 + 0.3**2 - 0.15**2) / (2.0 * 0.32 * 0.3))
+TURN = find_angle(0.15, 0.32, 0.3)
 """rad; crank and rod are in line there, and the shank turns back."""
 LOSS = 1.0
 """N m."""
