@@ -64,15 +64,11 @@ class _Cell(NamedTuple):
 
 
 class SectionFigure(NamedTuple):
-    """A picture of a section.
-
-    The picture is an inline SVG drawn by our own code, or an image as a data URI.
-    """
+    """A picture of a section, as an inline SVG."""
 
     alt: str
     caption: str
-    svg: str = ""
-    image: str = ""
+    svg: str
 
 
 @dataclass(frozen=True, slots=True)

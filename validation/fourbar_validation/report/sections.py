@@ -1,56 +1,31 @@
-"""Parts of report.html from elsewhere: the hard cases by family, and the cost."""
+"""Parts of report.html besides the scenes: the hard cases by family, limits, links."""
 
-import base64
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
-from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import VERDICTS, Counts, Row
-from fourbar_validation.report.html import Section, SectionFigure
+from fourbar_validation.report.html import Section
 from fourbar_validation.scenes.hard_families import HARD_FAMILIES
 
-HARD_FOLDER, _COST = "hard", "cost"
-"""Folders of the hard cases and of the study, in OUT."""
-_MUST = (
-    "each family of singular and extreme linkages must come out as its statement says. "
-)
-_PICTURES = {
-    "work-precision-torque.svg": (
-        "Error of the driving torque over the CPU time of a simulated second"
-    ),
-    "work-precision-force.svg": (
-        "Error of the worst pin force over the CPU time of a simulated second"
-    ),
-    "orders.svg": (
-        "Error of the driving torque and of each pin force over the timestep; a jump is"
-        " ringed"
-    ),
-}
-"""Pictures of the study, and what they show."""
-LARGEST_INLINE_PICTURE = 2_000_000
-"""Bytes of a picture that is taken into the page."""
-MOST_STUDIES = 3
-"""Scenes whose study is shown."""
+_BESIDE = ("hard/report.html", "cost/*/cost.md")
+"""Pages in OUT of a run of the hard suite, and of studies of cost."""
 
 
 def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
-    """Collect the hard cases and the study of cost, if there are any.
+    """Collect the section on hard cases, and links to what lies beside the report.
 
-    The former are of this run or in OUT/hard, the latter in OUT/cost. Those of this run
-    have the limits of the engines with them.
+    `hard`: rows of a run of the hard suite, which has the limits of the engines too.
     """
-    results = out / HARD_FOLDER / "results.csv"
     sections = []
     if hard is not None:
         sections += [collect_hard_cases(hard), _list_declared_limits()]
-    elif results.is_file() and (out / HARD_FOLDER / "report.html").is_file():
-        section = collect_hard_cases(read_columns(results))
-        links = [(f"{HARD_FOLDER}/report.html",) * 2]
-        text = f"From the run in {HARD_FOLDER}/: {_MUST}"
-        sections.append(replace(section, text=text, links=links))
-    folders = sorted(path.parent for path in (out / _COST).glob("*/cost.csv"))
-    return [*sections, *(_read_study(folder) for folder in folders[:MOST_STUDIES])]
+    pages = [page for pattern in _BESIDE for page in sorted(out.glob(pattern))]
+    if pages:
+        names = [page.relative_to(out).as_posix() for page in pages]
+        links = [(name, name) for name in names]
+        text = "Hard cases and studies of cost that lie beside this report:"
+        sections.append(Section("beside", "Beside this report", text, links=links))
+    return sections
 
 
 def collect_hard_cases(rows: Iterable[Row]) -> Section:
@@ -73,9 +48,9 @@ def collect_hard_cases(rows: Iterable[Row]) -> Section:
         if family.name in scenes
     ]
     headings = ("family", "scenes", *VERDICTS, "verdict", "what must happen")
-    text = _MUST.capitalize()
+    text = "Each family of singular and extreme linkages must come out as stated."
     numbers = (1, 2 + len(VERDICTS))
-    return Section(HARD_FOLDER, "Hard cases", text, headings, table, numbers=numbers)
+    return Section("hard", "Hard cases", text, headings, table, numbers=numbers)
 
 
 def _list_declared_limits() -> Section:
@@ -109,29 +84,3 @@ def find_family(scene: str) -> str | None:
         if scene.startswith(family.name.replace(" ", "-") + "-")
     ]
     return max(names, key=len, default=None)
-
-
-def _read_study(folder: Path) -> Section:
-    figures = []
-    for name, alt in _PICTURES.items():
-        picture = folder / name
-        if picture.is_file() and picture.stat().st_size <= LARGEST_INLINE_PICTURE:
-            data = base64.b64encode(picture.read_bytes()).decode("ascii")
-            image = f"data:image/svg+xml;base64,{data}"
-            figures.append(SectionFigure(alt, f"{alt}.", image=image))
-    text = (
-        f"What each digit of {folder.name} costs, from the study in"
-        f" {_COST}/{folder.name}/. Times are those of torque and pin forces at the"
-        " scene's positions: of MuJoCo with the reading of the forces, of an exact"
-        " engine in a plain loop that also assembles. "
-    )
-    links = [
-        (name, f"{_COST}/{folder.name}/{name}") for name in ("cost.md", "cost.csv")
-    ]
-    return Section(
-        f"cost-{folder.name}",
-        f"The study of {folder.name}",
-        text,
-        figures=figures,
-        links=links,
-    )
