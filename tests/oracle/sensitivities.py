@@ -47,17 +47,23 @@ _POINTS = "points"
 """Quantity of the row of all points of a scene."""
 
 
-def _group_keys(keys):
-    """Group the keys of numbers that vary together, by the setting of their rows.
+def _judge_groups(question, judge):
+    """Judge the numbers that vary together, by the setting of their rows.
 
     Lengths and polar pairs follow from the coordinates of a drawing: these are a group
     of their own.
     """
+    scene = take_few(question)
+    nominal = ask_free_bodies(scene)
     groups = {}
-    for key in keys:
+    for key in fourbar.sensitivity(scene).keys:
         setting = DRAWN_SETTING if is_coordinate(key) else "exact"
         groups.setdefault(setting, []).append(key)
-    return groups
+    rows = []
+    for setting, keys in groups.items():
+        judged = judge(question, scene, nominal, keys)
+        rows += [replace(row, setting=setting) for row in keep_worst(judged)]
+    return rows
 
 
 def study(question):
@@ -66,13 +72,7 @@ def study(question):
     In one these are the numbers of a scene that is stated by lengths, of a drawn scene
     in another one all coordinates of its drawing.
     """
-    scene = take_few(question)
-    nominal = ask_free_bodies(scene)
-    rows = []
-    for setting, keys in _group_keys(fourbar.sensitivity(scene).keys).items():
-        judged = _judge_study(question, scene, nominal, keys)
-        rows += [replace(row, setting=setting) for row in keep_worst(judged)]
-    return rows
+    return _judge_groups(question, _judge_study)
 
 
 def _judge_study(question, scene, nominal, keys):
@@ -139,23 +139,16 @@ def sensitivity(question):
     """Judge the derivatives of unknowns and points along one direction in the
     numbers of a scene, and along another one in the coordinates of its drawing.
     """
-    scene = take_few(question)
+    return _judge_groups(question, _judge_slopes)
+
+
+def _judge_slopes(question, scene, nominal, keys):
+    """Judge the derivatives along a direction in the numbers of some keys."""
     derivatives = fourbar.sensitivity(scene)
     file = SceneFile(scene)
-    nominal = ask_free_bodies(scene)
-    rows = []
-    for setting, keys in _group_keys(derivatives.keys).items():
-        direction = {key: step for key, (_, step) in file.find_stated(keys).items()}
-        if command_key(scene) in direction and scene.motion.stroke is None:
-            direction[command_key(scene)] = 1.0
-        judged = _judge_slopes(question, derivatives, file, nominal, direction)
-        rows += [replace(row, setting=setting) for row in judged]
-    return rows
-
-
-def _judge_slopes(question, derivatives, file, nominal, direction):
-    """Judge the derivatives along a direction, by the numbers of its keys."""
-    scene = file.scene
+    direction = {key: step for key, (_, step) in file.find_stated(keys).items()}
+    if command_key(scene) in direction and scene.motion.stroke is None:
+        direction[command_key(scene)] = 1.0
 
     def along(part):
         changes = {key: part * RELATIVE_STEP * step for key, step in direction.items()}
