@@ -24,6 +24,12 @@ def read_table(page, name):
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 
+def read_complaint(capsys):
+    """Return the one line that a command complained with."""
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
 def wait_until(ready, seconds):
     """Wait until something is so, and fail if it takes longer."""
     latest = time.monotonic() + seconds

@@ -33,29 +33,35 @@ class Few(Suite):
         return repr(self.names)
 
 
-class Unlucky:
+class Declines:
+    """Answers no scene, after what it does."""
+
+    def answer(self, scene, command):
+        self.act(scene)
+        return Answer(self.name, "exact", refusal="declined")
+
+
+class Unlucky(Declines):
     """Kills its process as often as the folder LIVES has files, and then agrees."""
 
     name = "unlucky"
 
-    def answer(self, scene, command):
+    def act(self, scene):
         for life in sorted(Path(os.environ["LIVES"]).iterdir()):
             life.unlink()
             os.kill(os.getpid(), signal.SIGKILL)
-        return Answer("unlucky", "exact", refusal="declined")
 
 
-class Moody:
+class Moody(Declines):
     """Agrees, except that it kills its process on scene b and hangs on scene c."""
 
     name = "moody"
 
-    def answer(self, scene, command):
+    def act(self, scene):
         if scene.title == "b":
             os.kill(os.getpid(), signal.SIGSEGV)
         if scene.title == "c":
             time.sleep(3600.0)
-        return Answer("moody", "exact", refusal="declined")
 
 
 def dies_at_first(*_):

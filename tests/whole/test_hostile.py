@@ -20,7 +20,6 @@ from fourbar.files import save
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar_validation.cli import status
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.results_file import LONGEST_CELL, read_columns
 from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
@@ -32,9 +31,10 @@ from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
+from tests.support.checkout import read_complaint
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
-from tests.support.unlucky import Few
+from tests.support.unlucky import Declines, Few
 
 HOSTILE = {
     "html": "<script>alert(1)</script><img src=x onerror=alert(2)>",
@@ -155,7 +155,7 @@ def test_what_is_no_table_of_results_is_one_line(text, tmp_path, capsys):
         (tmp_path / "results.csv").write_text(rows)
         (tmp_path / "record.json").write_text(record)
         assert status(["compare", str(tmp_path), str(tmp_path)]) == BAD_INPUT, rows[:20]
-        assert len(capsys.readouterr().err.splitlines()) == 1
+        read_complaint(capsys)
 
 
 @pytest.mark.slow
@@ -186,8 +186,7 @@ def test_a_small_parquet_of_very_much_is_one_line(
     pq.write_table(pa.table(columns), file)
     assert file.stat().st_size < 2 * LONGEST_CELL
     assert status(["compare", str(tmp_path), str(tmp_path)]) == BAD_INPUT
-    complained = capsys.readouterr().err
-    assert complained.count("\n") == 1 and words in complained
+    assert words in read_complaint(capsys)
 
 
 @pytest.mark.parametrize(
@@ -206,8 +205,7 @@ def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(name, tmp_path, caps
     (tmp_path / name).write_text('title = "no lengths"')
     line = ["run", str(tmp_path / name), "--out", str(tmp_path / "out")]
     assert status(line) == BAD_INPUT
-    printed = capsys.readouterr().err
-    assert not STEERING.search(printed) and len(printed.splitlines()) == 1
+    assert not STEERING.search(read_complaint(capsys))
 
 
 def listed(tmp_path, text):
@@ -247,15 +245,14 @@ def test_a_bad_suite_file_is_one_line(text, words, tmp_path):
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
-class Greedy:
+class Greedy(Declines):
     """Agrees, except that it asks for all memory on scene b."""
 
     name = "greedy"
 
-    def answer(self, scene, command):
+    def act(self, scene):
         if scene.title == "b.toml":
             bytearray(2 * WORKER_MEMORY)
-        return Answer("greedy", "exact", refusal="declined")
 
 
 @pytest.mark.linux

@@ -204,17 +204,6 @@ def words_of(out, guest):
     return [*words.split(), "--no-pictures", f"--guest={guest}", "--out", str(out)]
 
 
-@pytest.fixture
-def undisturbed(tmp_path):
-    """A guest, and the folder of a run with it that nothing disturbed."""
-    guest, out = write_program(tmp_path, "plain"), tmp_path / "undisturbed"
-    with pytest.MonkeyPatch.context() as here:
-        judge_here(here)
-        assert status(words_of(out, guest)) == HOLDS
-    end_guests()
-    return guest, out
-
-
 def runs(pid, word):
     """Return whether a process has a word in its line; one of them names its guest."""
     command = Path(f"/proc/{pid}/cmdline").read_bytes()
@@ -279,12 +268,15 @@ class Disturbed:
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(200 + 120 * KILLS)
 def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
-    tmp_path, undisturbed, monkeypatch
+    tmp_path, monkeypatch
 ):
     """A run is interrupted, its guest, a worker and itself are killed at random moments
     with questions left to ask, and it meets a full disk, all in one folder.
     """
-    guest, expected = undisturbed
+    guest, expected = write_program(tmp_path, "plain"), tmp_path / "undisturbed"
+    judge_here(monkeypatch)
+    assert status(words_of(expected, guest)) == HOLDS
+    end_guests()
     out, mark = tmp_path / "out", f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     run = Disturbed(out, guest, mark)

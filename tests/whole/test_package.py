@@ -27,7 +27,7 @@ from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, say_install
 from fourbar.files import save
 from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
-from tests.support.checkout import ROOT, read
+from tests.support.checkout import ROOT, read, read_complaint
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
 
@@ -87,8 +87,7 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere():
 def test_what_needs_a_checkout_says_so_in_one_line(line, monkeypatch, capsys):
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     assert lab([line]) == BAD_INPUT
-    complained = capsys.readouterr().err
-    assert complained.count("\n") == 1 and "needs a checkout" in complained
+    assert "needs a checkout" in read_complaint(capsys)
 
 
 def test_the_harness_lists_a_command_whose_library_is_missing(monkeypatch, capsys):
@@ -101,9 +100,7 @@ def test_the_harness_lists_a_command_whose_library_is_missing(monkeypatch, capsy
     assert "mujoco is not installed" in capsys.readouterr().out
     monkeypatch.setattr("fourbar_validation.cli.resolve_name", without_flint)
     assert harness(["run", "scene.toml", "--out", "results"]) == BROKEN
-    complained = capsys.readouterr().err
-    assert complained.count("\n") == 1
-    assert "flint is not installed: pip install" in complained
+    assert "flint is not installed: pip install" in read_complaint(capsys)
 
 
 def test_extras_of_extras_are_named_one_by_one(monkeypatch):
@@ -155,8 +152,7 @@ def test_an_extra_that_is_missing_is_one_line(
     monkeypatch.setitem(sys.modules, library, None)
     before = sorted(tmp_path.iterdir())
     assert status(command.split()) == BROKEN
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1 and f'pip install ".[{extra}]" in the checkout' in err
+    assert f'pip install ".[{extra}]" in the checkout' in read_complaint(capsys)
     assert sorted(tmp_path.iterdir()) == before
 
 
