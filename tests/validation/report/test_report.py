@@ -498,6 +498,17 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
         assert [*summary.silent.values()] == [f"theirs: nothing compared {words}"]
 
 
+@pytest.mark.parametrize("pictures", [1, 2, 3])
+def test_the_first_two_pictures_of_a_scene_are_shown_small_too(pictures):
+    """Of a single position there is the linkage alone."""
+    figure = "".join(f"<svg>p{number}</svg>" for number in range(pictures))
+    _, text = report([replace(demo(draw=False), figure=figure)])
+    assert text.count("<svg>") == text.count("</svg>")
+    sketch = text[text.index('<div class="sketches">') :]
+    assert sketch.index("</a>") > sketch.index(f"p{min(pictures, 2) - 1}")
+    assert "p2" not in sketch[: sketch.index("</a>")]
+
+
 def test_an_engine_that_drew_nothing_is_not_in_the_caption_of_a_picture():
     rows = [*demo().rows, refuse("demo", "it reads no cylinder")]
     _, text = report([replace(demo(), rows=rows)])
