@@ -6,9 +6,7 @@ import pytest
 from pytest import approx, raises
 
 from fourbar import Bar, InputError
-from fourbar.files.scene_file import loads
 from tests.support.rows import read_rows
-from tests.support.texts import LENGTHS
 
 
 def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
@@ -59,8 +57,3 @@ def test_a_material_that_states_no_mass_is_refused(stated, key):
     with raises(InputError) as error:
         Bar(0.4, **json.loads(stated))
     assert error.value.key == key
-
-
-def test_a_scene_file_names_the_bar_whose_material_is_wrong():
-    with raises(InputError, match=r"bars\.coupler\.density = '7850 kg/m"):
-        loads(f'{LENGTHS}[bars.coupler]\ndensity = "7850 kg/m^3"\n')

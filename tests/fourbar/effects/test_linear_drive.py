@@ -20,6 +20,7 @@ from fourbar import (
     LinearDrive,
     Motion,
     Place,
+    PointDrive,
     Scene,
     dump,
     solve,
@@ -71,6 +72,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
 
 CROSSES_O2 = LinearDrive(Place(1, (0.2, 0.0)), Place(2, (0.1, 0.0)))
 MEETS = LinearDrive(Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0)))
+ALONG_CRANK = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
 # the cranks of a parallelogram keep their distance while they are parallel, and only
 # then
 PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
@@ -83,6 +85,7 @@ PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
         (CRANK_ROCKER_LENGTHS, MEETS, 1, ["ok", "no_direction", "ok"]),
         (PARALLELOGRAM, PARALLEL, 1, ["no_lever"] * 3),
         (PARALLELOGRAM, PARALLEL, -1, ["ok"] * 3),
+        (PARALLELOGRAM, ALONG_CRANK, 1, ["no_lever"] * 3),
     ],
 )
 def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(

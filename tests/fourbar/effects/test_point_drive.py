@@ -1,22 +1,11 @@
-"""A force at a point as the drive: its size, its pin forces, how a file states it."""
+"""A force at a point as the drive, in a study and a file."""
 
 from dataclasses import replace
 from math import pi
 
-import numpy as np
-
-from fourbar import Motion, Place, Point, PointDrive, solve, vary
+from fourbar import Point, solve, vary
 from fourbar.files import dump, loads
-from tests.support.scenes import crank_rocker
 from tests.support.texts import HELD
-
-
-def test_where_the_point_moves_across_the_direction_there_is_no_lever():
-    """A crank pushed along itself: the point has no speed in that direction."""
-    drive = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
-    s = solve(crank_rocker(drive=drive, motion=Motion(0.7, 10.0)))
-    assert s.status == ["no_lever"]
-    assert np.isnan(s.drive_force[0]) and np.isnan(s.F12[0]).all()
 
 
 def test_a_study_and_a_file_carry_it():

@@ -89,6 +89,7 @@ gravity | gravitiy | effects.gravitiy | must be among gravity,
 "0.1 m" | "-0.1 m" | lengths.input | -0.1 m | > 0
 "0.1 m" | "1e-400 m" | lengths.input | > 0
 "0.2 kg" | "-1 kg" | bars.input.mass | -1 kg | >= 0
+mass = "0.2 kg" | density = "7850 kg/m^3" | bars.input.density = '7850 kg/m
 output = "0.22 m"\n |  | lengths.output | missing
 "0.1 m" | "10 m" | lengths | never close
 "open" | "opne" | motion.branch | opne | must be "open" or "crossed"

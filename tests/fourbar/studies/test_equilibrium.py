@@ -21,7 +21,6 @@ from fourbar import (
     Gravity,
     Load,
     Motion,
-    NotAssembledError,
     Place,
     Scene,
     Spring,
@@ -33,7 +32,6 @@ from fourbar import (
     equilibrium,
     limit_positions,
     solve,
-    uniform,
 )
 from fourbar.files import load, loads
 from fourbar.formulas.mobility import find_intervals
@@ -475,9 +473,3 @@ def test_the_command_prints_what_python_finds(show):
     folded = counterexamples / "kite_with_A_on_O4.toml"
     kite = json.loads(show("equilibrium", folded, "--json"))
     assert kite["not_decided"][0]["theta_4"] is None  # which it has not there
-
-
-def test_what_assembles_nowhere_is_refused():
-    scene = Scene(uniform(1.0, 1.5, 1.0, 0.2), Motion(pi))
-    with pytest.raises(NotAssembledError, match="assembles at none"):
-        equilibrium(scene)
