@@ -19,16 +19,16 @@ from fourbar.mjcf import write_mjcf
 from fourbar_validation.compare import effect_sizes as in_scales
 from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
-from fourbar_validation.engines.registry import HARD_ENGINES
+from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.checkout import ROOT, read, run_python
 from tests.validation.engines.test_applied_effects import (
     EXACT,
     ON_TREES,
-    SIMULATED,
     outcome,
 )
 
+SIMULATED = [engine for engine in ENGINES if engine.through_time]
 FOLDERS = ("", "fourbar", "validation", "validation/fourbar_validation")
 THE_READER_MAKES = {"fourbar/effects/latch.py", "tests/fourbar/effects/test_latch.py"}
 PAGE, QUANTITY = read("docs/extending.md").split("\n## A quantity\n")
@@ -185,7 +185,7 @@ ADDED = {
 """Files in which the guide puts a line of its quantity, and the line beside it."""
 JUDGED = """
 from fourbar.files import loads
-from fourbar_validation.engines.registry import HARD_ENGINES
+from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
 from fourbar_validation.run.judge import judge
 
 exact = [engine for engine in HARD_ENGINES if not engine.through_time]
