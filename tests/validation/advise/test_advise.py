@@ -129,25 +129,15 @@ def test_the_file_alone_keeps_the_error(tmp_path, call):
     loop = ClosedLoop(out.read_text())
     mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
     steps = round(2.0 * math.pi / 10.0 / loop.model.opt.timestep)
-    rows = {}
+    at, rows = [], []
     for _ in range(steps):
         mujoco.mj_step(loop.model, loop.data)
         loop.forward()
-        seen = {
-            "theta_2": loop.data.qpos[O2],
-            "omega_2": loop.data.qvel[O2],
-            "alpha_2": loop.data.qacc[O2],
-            "torque": loop.crank_torque(),
-        }
-        for key, value in (seen | loop.forces()).items():
-            rows.setdefault(key, []).append(value)
-    columns = {key: np.array(values) for key, values in rows.items()}
-    commanded = Command(
-        columns["theta_2"],
-        np.ones(steps, dtype=np.int8),
-        columns["omega_2"],
-        columns["alpha_2"],
-    )
+        at.append([loop.data.qpos[O2], loop.data.qvel[O2], loop.data.qacc[O2]])
+        rows.append(loop.forces() | {"torque": loop.crank_torque()})
+    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+    angle, *rates = np.transpose(at)
+    commanded = Command(angle, np.ones(steps, dtype=np.int8), *rates)
     assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 

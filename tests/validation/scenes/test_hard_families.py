@@ -145,12 +145,7 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
 def ask_nearby(scene, solution, command=None):
     """Ask the balls again, within the rounding of every theta_2."""
     command = command or fourbar.command(scene)
-    nearby = make_answer_nearby(
-        HARD_ENGINES[0],
-        scene,
-        command,
-        solution,
-    )
+    nearby = make_answer_nearby(HARD_ENGINES[0], scene, command, solution)
     return nearby(np.ones(len(command.angle), dtype=bool))
 
 
@@ -277,8 +272,8 @@ def test_a_limit_is_where_it_was(limit, tmp_path, monkeypatch):
     assert not limit.holds(limit.outside)
 
 
-def simulated(settings=RECIPE, scene=SWEEP):
-    return simulate.MujocoSimulated(settings).answer(scene, fourbar.command(scene))
+def simulated(settings=RECIPE):
+    return simulate.MujocoSimulated(settings).answer(SWEEP, fourbar.command(SWEEP))
 
 
 def test_a_healthy_run_raises_no_alarm():
