@@ -191,18 +191,18 @@ def test_the_times_of_engines_are_those_of_the_run():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "motion, pictures",
+    "motion, pictures, drawn",
     [
-        (Motion(Sweep(0.0, 6.0, 24)), 3),
-        (Motion(1.0, 5.0), 1),  # the linkage alone
-        (Motion(1.0, 0.0, free=Free(0.2, 20)), 3),
-        (Motion(Sweep(0.0, 6.0, 24), 5.0), 3),
+        (Motion(Sweep(0.0, 6.0, 24)), 3, ["free-body"]),
+        (Motion(1.0, 5.0), 1, []),  # the linkage alone
+        (Motion(1.0, 0.0, free=Free(0.2, 20)), 3, []),  # an engine has no free motion
+        (Motion(Sweep(0.0, 6.0, 24), 5.0), 3, ["free-body"]),
     ],
     ids=["positions", "one position", "released", "sweep"],
 )
-def test_every_kind_of_scene_is_drawn(motion, pictures):
+def test_every_kind_of_scene_is_drawn(motion, pictures, drawn):
     made = judge_for_report("kind", crank_rocker(motion=motion), [FREE_BODY])
-    assert made.figure.count("<svg") == pictures
+    assert made.figure.count("<svg") == pictures and made.drawn == drawn
     assert "kind: crank-rocker" in report([made])[1]
 
 
@@ -501,7 +501,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
 @pytest.mark.parametrize("pictures", [1, 2, 3])
 def test_the_first_two_pictures_of_a_scene_are_shown_small_too(pictures):
     """Of a single position there is the linkage alone."""
-    figure = "".join(f"<svg>p{number}</svg>" for number in range(pictures))
+    figure = "".join(f"<svg>p{number}</svg>\n" for number in range(pictures))
     _, text = report([replace(demo(draw=False), figure=figure)])
     assert text.count("<svg>") == text.count("</svg>")
     sketch = text[text.index('<div class="sketches">') :]

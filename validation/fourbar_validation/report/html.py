@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fourbar.quantities import ANGLES, COUPLE, LINE, PIN_FORCES, UNKNOWNS
+from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -36,11 +36,6 @@ they are opened.
 """
 QUANTITY_ORDER = (*UNKNOWNS, "torque_inertia", LINE.value, f"{LINE.value}_inertia")
 """Quantities in the order of the computation; others follow by name."""
-
-_DRAWN = ((COUPLE.value, LINE.value, *PIN_FORCES), ANGLES)
-"""Quantities of which the pictures of a scene show some, or where nobody answers them
-those that they show instead.
-"""
 
 
 class _Cell(NamedTuple):
@@ -103,18 +98,6 @@ class _SceneView:
     """(quantity, engine): the comparison that used most of its allowance."""
     worst: dict[str, _Cell]
     """engine: its comparison that used most."""
-
-    @property
-    def drawn(self) -> list[str]:
-        """Return the independent engines whose answers the pictures show."""
-        shown: set[str] = set()
-        for quantities in _DRAWN:
-            for (quantity, engine), cell in self.by_place.items():
-                if quantity in quantities and cell.row.compared:
-                    shown.add(engine)
-            if shown:
-                break
-        return [engine for engine in self.engines if engine in shown - {FORMULAS}]
 
     @property
     def counts(self) -> Counts:

@@ -231,6 +231,7 @@ class Summary:
         for scene in self._shown:
             if scene.name == drawn.name:
                 scene.figure = drawn.figure
+                scene.drawn = drawn.drawn
 
     def _add_times(self, scene: Record) -> None:
         refused = {row.engine for row in scene.rows if row.verdict == REFUSES}

@@ -65,7 +65,7 @@ _SUBSCRIPT = str.maketrans("234", "₂₃₄")
 def draw_scene_figure(record: Record) -> str | None:
     """Return the linkage and, for a sweep, the answers as SVGs.
 
-    The text is None if nothing assembles.
+    The text is None if nothing assembles. The record is told whose answers are drawn.
     """
     solution = record.solution
     scene = record.scene
@@ -79,9 +79,9 @@ def draw_scene_figure(record: Record) -> str | None:
         shown = _MOTION_AND_FORCE
     elif solution.F32 is not None:
         shown = (name_driving(scene), _choose_force(record, solution))
-    return drawn + "".join(
-        _Curve(name, record, scene, solution).draw() for name in shown
-    )
+    curves = [_Curve(name, record, scene, solution) for name in shown]
+    record.drawn = sorted({one.engine for curve in curves for one in curve.answers})
+    return drawn + "".join(curve.draw() for curve in curves)
 
 
 def find_best_position(solution: Solution) -> int:

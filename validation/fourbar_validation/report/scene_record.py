@@ -57,6 +57,8 @@ class Record:
     """
     figure: str | None = None
     """SVG of the answers, or None where there is nothing to draw."""
+    drawn: list[str] = field(default_factory=list)
+    """Engines whose answers it shows."""
     solution: Solution | None = None
     answers: list[Answer] = field(default_factory=list)
 
