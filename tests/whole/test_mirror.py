@@ -71,7 +71,6 @@ validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
 validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: seen
 validation/engines/mujoco/robots/test_closures.py | ancestry loop_facts
 validation/engines/mujoco/robots/test_measure.py | planes
-validation/robots/test_files.py | validation/engines/mujoco/robots: compiled
 validation/robots/test_loops.py | options
 validation/published/test_published.py | comparison printed_figures thesis
 validation/regression/test_regression.py | accept engines history record render rules

@@ -5,7 +5,7 @@ import pytest
 
 from fourbar.errors import BAD_INPUT, InputError
 from fourbar_validation.cli import status
-from fourbar_validation.engines.mujoco.robots.compiled import (
+from fourbar_validation.engines.mujoco.robots.pose import (
     compile_robot,
     list_unknown_parts,
 )

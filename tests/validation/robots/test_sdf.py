@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 import fourbar
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.mujoco.describe import UNLIMITED_RANGE
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import SETTINGS_OF_AN_SDF
+from fourbar_validation.engines.mujoco.robots.pose import (
+    compile_robot,
+)
 from fourbar_validation.robots.files import read_robot
 from tests.support.robots import (
     examine_text,

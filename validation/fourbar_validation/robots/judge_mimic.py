@@ -294,20 +294,18 @@ def fit_minimax(
     """
     from scipy.optimize import linprog
 
-    low = float(x.min())
-    high = float(x.max())
-    size = float(np.ptp(y)) or 1.0
-    scaled = (2.0 * x - (low + high)) / (high - low)
+    fitted = np.polynomial.Chebyshev.fit(x, y, degree)
+    left = y - fitted(x)
+    size = float(np.abs(left).max()) or 1.0
+    scaled = np.polynomial.polyutils.mapdomain(x, fitted.domain, fitted.window)
     basis = np.polynomial.chebyshev.chebvander(scaled, degree)
-    middle = 0.5 * float(y.max() + y.min())
-    wanted = (y - middle) / size
     ones = np.ones((len(x), 1))
     above = np.block([[basis, -ones], [-basis, -ones]])
-    limits = np.concatenate([wanted, -wanted])
+    limits = np.concatenate([left, -left]) / size
     cost = np.eye(degree + 2)[-1]
     best = linprog(cost, A_ub=above, b_ub=limits, bounds=(None, None))
-    fitted = np.polynomial.Chebyshev(size * best.x[:-1], domain=(low, high))
-    return _list_powers(fitted.convert(kind=np.polynomial.Polynomial) + middle)
+    fitted += np.polynomial.Chebyshev(size * best.x[:-1], fitted.domain)
+    return _list_powers(fitted.convert(kind=np.polynomial.Polynomial))
 
 
 def show_mimic(report: _MimicReport) -> None:

@@ -1,7 +1,7 @@
 """The drive of a scene, as what it exerts on the bodies of a loop."""
 
 import cmath
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,15 +14,6 @@ from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
-
-
-class _Wrench(NamedTuple):
-    """Force at a point of a body, N, and couple, N m, world axes, (3,) each."""
-
-    body: int
-    force: Array
-    couple: Array
-    point: Array
 
 
 class Cylinder(NamedTuple):
@@ -45,10 +36,10 @@ def find_cylinder(model: mujoco.MjModel) -> Cylinder | None:
 
 
 class LoopDrive:
-    """Wrenches of a scene's drive on the bars of a loop, per N m or N that it exerts.
+    """What a scene's drive exerts on the bars of a loop, per N m or N.
 
-    The ground bears the opposite of each. The file's own cylinder acts where the file
-    has it, in the place of that of the scene.
+    The ground bears the opposite. The file's own cylinder acts where the file has it,
+    in the place of that of the scene.
     """
 
     def __init__(self, model: mujoco.MjModel, loop: RobotLoop, scene: Scene) -> None:
@@ -61,62 +52,63 @@ class LoopDrive:
         if isinstance(scene.drive, LinearDrive):
             self.cylinder = find_cylinder(model)
 
-    def _list_wrenches(self, data: mujoco.MjData) -> list[_Wrench]:
-        frame = LoopFrame(self.loop, data)
-        none = np.zeros(3)
-        bodies = self.loop.bodies
-        if self.couple_bar is not None:
-            first = _Wrench(bodies[self.couple_bar][0], none, frame.normal, none)
-            return [first, _Wrench(bodies[1][0], none, -frame.normal, none)]
+    def _find_loads(self, data: mujoco.MjData) -> Array:
+        """Return force and couple on each body, world axes, (nbody, 6), per N m or N.
 
-        def locate(place: Place) -> tuple[Array, complex]:
-            """Return a place in world axes, (3,), m, and its bar's direction."""
+        As MuJoCo has it, a force acts at the mass centre.
+        """
+        frame = LoopFrame(self.loop, data)
+        loads = np.zeros((self.model.nbody, 6))
+        ground, *_ = self.loop.bodies[1]
+        if self.couple_bar is not None:
+            loads[self.loop.bodies[self.couple_bar][0], 3:] = frame.normal
+            loads[ground, 3:] = -frame.normal
+            return loads
+
+        def locate(place: Place) -> tuple[int, Array, complex]:
+            """Return body and place in world axes, (3,), m, and its bar's direction."""
             line = frame.line(place.bar)
             unit = line / abs(line)
-            arm: Any = unit * complex(place.in_bar)
             pin = frame.locate(place.bar, FIRST_PIN[place.bar])
-            return pin + np.array([arm.real, arm.imag]) @ frame.axes, unit
+            body, *_ = self.loop.bodies[place.bar]
+            return body, pin + frame.to_world(unit * complex(place.in_bar)), unit
 
         if isinstance(self.drive, PointDrive):
-            place, unit = locate(self.drive.place)
+            body, start, unit = locate(self.drive.place)
             direction = cmath.rect(1.0, self.drive.direction)
             if self.drive.frame == "bar":
                 direction *= unit
-            force = np.array([direction.real, direction.imag]) @ frame.axes
-            bar = self.drive.place.bar
-            return [
-                _Wrench(bodies[bar][0], force, none, place),
-                _Wrench(bodies[1][0], -force, none, place),
-            ]
-        if self.cylinder is not None:
-            start, end = data.site_xpos[self.cylinder.sites]
-            pushed = self.model.site_bodyid[self.cylinder.sites].tolist()
-            line = end - start
+            force = frame.to_world(direction)
+            pushed = ((body, start, force), (ground, start, -force))
         else:
-            assert isinstance(self.drive, LinearDrive)
-            ends = (self.drive.start, self.drive.end)
-            (start, _), (end, _) = map(locate, ends)
-            pushed = [bodies[one.bar][0] for one in ends]
-            line = frame.in_plane(end - start) @ frame.axes
-        force = line / np.linalg.norm(line)
-        return [
-            _Wrench(pushed[0], -force, none, start),
-            _Wrench(pushed[1], force, none, end),
-        ]
+            if self.cylinder is not None:
+                start, end = data.site_xpos[self.cylinder.sites]
+                first, second = self.model.site_bodyid[self.cylinder.sites].tolist()
+                line = end - start
+            else:
+                assert isinstance(self.drive, LinearDrive)
+                first, start, _ = locate(self.drive.start)
+                second, end, _ = locate(self.drive.end)
+                line = frame.in_plane(end - start) @ frame.axes
+            force = line / np.linalg.norm(line)
+            pushed = ((first, start, -force), (second, end, force))
+        for body, point, one in pushed:
+            arm = point - data.xipos[body]
+            loads[body] += [*one, *np.cross(arm, one)]
+        return loads
 
     def exert(self, data: mujoco.MjData, size: float) -> None:
         """Apply the drive with a size, N m or N, in the state that is placed."""
-        data.xfrc_applied[:] = 0.0
-        for body, force, couple, point in self._list_wrenches(data):
-            arm = point - data.xipos[body]
-            data.xfrc_applied[body, :3] += size * force
-            data.xfrc_applied[body, 3:] += size * (couple + np.cross(arm, force))
+        data.xfrc_applied[:] = size * self._find_loads(data)
 
     def find_pull(self, data: mujoco.MjData) -> Array:
         """Return the generalized forces per N m or N, (nv,), in the state placed."""
         pull = np.zeros(self.model.nv)
-        for body, force, couple, point in self._list_wrenches(data):
-            mujoco.mj_applyFT(self.model, data, force, couple, point, body, pull)
+        loads = self._find_loads(data)
+        for body in np.flatnonzero(loads.any(axis=1)):
+            force, couple = np.split(loads[body], 2)
+            place = data.xipos[body]
+            mujoco.mj_applyFT(self.model, data, force, couple, place, body, pull)
         return pull
 
     def find_speed(self, data: mujoco.MjData) -> float:

@@ -6,8 +6,9 @@ counts with its mass. What a scene cannot hold is named with its size.
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from decimal import Decimal
 
 import mujoco
 import numpy as np
@@ -17,11 +18,14 @@ from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
     ANGLE_FROM_LIMITS,
+    DIGITS_STATED,
+    count_equalities,
     find_intervals,
     list_met_equalities,
+    meet_change_points,
     turns_fully,
 )
-from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar, Lengths
 from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, find_signs
@@ -29,7 +33,9 @@ from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
+    climb,
     describe_actuator,
+    find_tied_bodies,
     is_enabled,
     list_actuators,
     list_lifted_masses,
@@ -41,8 +47,6 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import list_unknown_parts
-from fourbar_validation.engines.mujoco.robots.digits import meet_lengths
 from fourbar_validation.engines.mujoco.robots.inside import reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     LoopScene,
@@ -55,6 +59,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     OUTSIDE_A_RANGE,
     PosedRobot,
     find_outside,
+    list_unknown_parts,
     pose_robot,
 )
 from fourbar_validation.engines.mujoco.robots.seen import Lump, SeenLoop
@@ -75,6 +80,8 @@ ROUND_OFF_OF_LOADS = 1e-9
 """Part of what acts below which a number is round-off."""
 _ACROSS = 1e-6
 """Part of gravity below which none acts across the plane."""
+_TURN_OF_A_QUATERNION = 2.0
+"""Angle by which a rotation changes over the change of its unit quaternion."""
 _SKEW = 1e-6
 """rad; axes less apart than this are parallel but for the digits of the file."""
 _SAME_OUTPUT = 1e-6
@@ -294,10 +301,17 @@ class SceneOfLoop(SeenLoop):
         )
 
     def meet_lengths(self) -> tuple[float, ...]:
-        """Return the lengths within the digits of the file, and say which are equal."""
+        """Return the lengths within the digits of the file, and say which are equal.
+
+        MuJoCo saves positions and quaternions with six significant digits, and so do
+        many generators. The lengths of a parallelogram then differ in their seventh
+        digit, and the linkage as it stands has no change point and another range. As in
+        a scene that states rounded lengths or coordinates, the lengths are those of the
+        parallelogram or kite that the digits cannot tell from the file's.
+        """
         d, a, b, c = map(round_off, self.loop.lengths)
         stated = (d, a, b, c)
-        met = tuple(map(round_off, meet_lengths(self.compiled, self.loop, stated)))
+        met = tuple(map(round_off, self._meet_lengths(stated)))
         equal = [
             f"{first} and {second}, which differ by {gap:.4g} m"
             for first, second, gap in list_met_equalities(stated, met)
@@ -309,6 +323,39 @@ class SceneOfLoop(SeenLoop):
             )
             self.loop = replace(self.loop, read_lengths=met)
         return met
+
+    def _meet_lengths(self, lengths: Lengths) -> Lengths:
+        """Return lengths, of a parallelogram or a kite without their rounding."""
+        finest = DIGITS_STATED * math.fsum(lengths)
+        rounding = 0.0
+        for moved in self._list_roundings(max(lengths)):
+            if moved <= finest:  # numbers of fewer digits are meant as they stand
+                rounding += moved
+        fine = [find_rounding([length]) <= finest for length in lengths]
+        if not any(fine):
+            return lengths
+        share = rounding / sum(fine)
+        d, a, b, c = (share if is_fine else 0.0 for is_fine in fine)
+        met = meet_change_points(lengths, (d, a, b, c))
+        # one equality alone is met by chance: nobody builds it
+        return met if count_equalities(met) > 1 else lengths
+
+    def _list_roundings(self, longest: float) -> Iterator[float]:
+        """List how far the rounding of each stated place and turn moves a pin, m."""
+        model = self.model
+        equality = self.loop.equality
+        first, second = find_tied_bodies(model, equality)
+        if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_SITE:
+            sites = (model.eq_obj1id[equality], model.eq_obj2id[equality])
+            places = [model.site_pos[site] for site in sites]
+        else:
+            places = [model.eq_data[equality, 0:3]]
+        places += [model.jnt_pos[joint] for joint in self.hinge.values()]
+        for body in {*climb(model, first)} ^ {*climb(model, second)}:
+            places.append(model.body_pos[body])
+            turned = find_rounding(self.compiled.quaternions.get(body, ()))
+            yield _TURN_OF_A_QUATERNION * longest * turned
+        yield from map(find_rounding, places)
 
     @property
     def _pull(self) -> complex:
@@ -572,3 +619,14 @@ def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
     _, middle, half = min(ranges)
     half -= min(ANGLE_FROM_LIMITS, 0.5 * half)
     return middle - half, middle + half
+
+
+def find_rounding(vector: Iterable[float]) -> float:
+    """Return the size of the rounding of a vector of numbers as they are written.
+
+    All have as many significant digits as the one that shows most, since zeros at the
+    end are not written. A zero is exact.
+    """
+    numbers = [Decimal(repr(float(number))) for number in vector if number]
+    digits = max((len(n.normalize().as_tuple().digits) for n in numbers), default=0)
+    return math.hypot(*(0.5 * 10.0 ** (n.adjusted() + 1 - digits) for n in numbers))

@@ -10,12 +10,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from scipy import ndimage
 
 from fourbar.effects import Flywheel
 from fourbar.errors import InputError, LimitError, write_count
@@ -55,7 +55,6 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import collect_warnings
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -72,7 +71,10 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import (
     find_loop_of_scene,
     turn,
 )
-from fourbar_validation.engines.mujoco.robots.pose import pose_robot
+from fourbar_validation.engines.mujoco.robots.pose import (
+    collect_warnings,
+    pose_robot,
+)
 from fourbar_validation.engines.mujoco.robots.settings import SettingsSearch
 
 POSITIONS_OF_A_LOOP = 37
@@ -231,12 +233,12 @@ def measure_loop(
     )
 
 
-def _find_longest_run(states: InsideAnswer) -> tuple[float, ...]:
+def _find_longest_run(states: InsideAnswer) -> Array:
     """Return the most angles in a row at which the loop closes, in their order."""
-    closed = {*states.rows.angle.tolist()}
-    angles = sorted({*closed, *states.open})
-    runs = groupby(angles, key=closed.__contains__)
-    return max((tuple(run) for is_closed, run in runs if is_closed), key=len)
+    angles = np.union1d(states.rows.angle, states.open)
+    runs, _ = ndimage.label(np.isin(angles, states.rows.angle))
+    _, *counts = np.bincount(runs, minlength=2)
+    return np.asarray(angles[runs == 1 + np.argmax(counts)])
 
 
 def _describe_findings(

@@ -20,10 +20,13 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_followers,
     name_joint,
 )
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 from fourbar_validation.engines.mujoco.robots.loop_scene import is_seen_from_behind
-from fourbar_validation.engines.mujoco.robots.pose import HINGE_JOINT, find_joint
+from fourbar_validation.engines.mujoco.robots.pose import (
+    HINGE_JOINT,
+    compile_robot,
+    find_joint,
+)
 
 _SAME_LENGTH = 1e-3
 """Relative difference of a length in a file from that in a scene: files state three or

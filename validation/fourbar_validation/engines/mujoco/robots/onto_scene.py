@@ -29,7 +29,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
 )
 from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import find_loops
-from fourbar_validation.engines.mujoco.robots.compiled import compile_robot
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
@@ -48,6 +47,7 @@ from fourbar_validation.engines.mujoco.robots.loop_scene import (
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     PosedRobot,
+    compile_robot,
     move_to,
     pose_robot,
 )
@@ -295,19 +295,15 @@ def _fits_gravity(
     Sizes are compared elsewhere; without gravity in one of the two, no side fits.
     """
     model = posed.model
-    wanted = np.zeros(2)
-    for effect in scene.effects:
-        if isinstance(effect, Gravity):
-            wanted = wanted + effect.vector
     turned = loop.angles[0] - scene.linkage.ground_angle
     gravity = model.opt.gravity * is_enabled(model, "gravity")
-    in_scene = replace(loop, turned=turned)
-    of_robot = LoopFrame(in_scene, posed.data).in_plane(gravity)
-    sizes = np.linalg.norm([of_robot, wanted], axis=1)
-    if not sizes.all():
+    in_scene = LoopFrame(replace(loop, turned=turned), posed.data)
+    effects = (one for one in scene.effects if isinstance(one, Gravity))
+    wanted = sum(complex(*one.vector) for one in effects)
+    pull = complex(*in_scene.in_plane(gravity))
+    if not (pull and wanted):
         return False
-    difference = of_robot / sizes[0] - wanted / sizes[1]
-    return bool(np.linalg.norm(difference) <= _SAME_DIRECTION)
+    return abs(pull / abs(pull) - wanted / abs(wanted)) <= _SAME_DIRECTION
 
 
 def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:

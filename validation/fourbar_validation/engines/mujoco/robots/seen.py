@@ -59,6 +59,10 @@ class LoopFrame:
         """Project a vector of the world on the plane, (2,)."""
         return self.axes @ vector
 
+    def to_world(self, vector: complex) -> Array:
+        """Return a vector of the plane in world axes, (3,)."""
+        return np.asarray([vector.real, vector.imag] @ self.axes)
+
     def locate(self, bar: int, pin: str) -> Array:
         """Locate a pin of a bar in world axes, (3,), m."""
         body = self.loop.bodies[bar][0]

@@ -9,11 +9,11 @@ import pytest
 from pytest import approx
 
 from fourbar.formulas.mobility import classify
-from fourbar_validation.engines.mujoco.robots.digits import find_rounding
 from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
     LoopInside,
 )
+from fourbar_validation.engines.mujoco.robots.loop_scene import find_rounding
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import (
