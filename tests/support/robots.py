@@ -8,12 +8,15 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import (
     find_closures,
     list_closures,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions, RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    MeasureOptions,
+    PoseOptions,
+    RobotFile,
+)
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import (
     examine_file,

@@ -69,8 +69,7 @@ validation/check/test_check.py | judge_table mistakes theirs variants wrong_scen
 validation/robots/test_check_mjcf.py | differences guard judge_loop
 validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
 validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: seen
-validation/engines/mujoco/robots/test_closures.py | ancestry loop_facts
-validation/engines/mujoco/robots/test_measure.py | planes
+validation/engines/mujoco/robots/test_closures.py | ancestry
 validation/robots/test_loops.py | options
 validation/published/test_published.py | comparison printed_figures thesis
 validation/regression/test_regression.py | accept engines history record render rules

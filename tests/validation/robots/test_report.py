@@ -14,7 +14,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import UNDECIDED
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     SettingsAdvice,
     TriedSettings,
     WorstState,

@@ -28,7 +28,9 @@ from fourbar_validation.advise.matters import (
     write_sentence,
 )
 from fourbar_validation.advise.worst_errors import WorstErrors
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    MeasureOptions,
+)
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
     LONGEST_TIME_CONSTANT,

@@ -27,17 +27,15 @@ from fourbar_validation.compare.tolerance import (
     hold_simulated,
 )
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     MOTION_OF_BARS,
+    SETTINGS_OF_AN_SDF,
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
-    measure_sizes,
-)
-from fourbar_validation.engines.mujoco.robots.loop_facts import (
-    SETTINGS_OF_AN_SDF,
     PoseOptions,
     RobotFile,
+    measure_sizes,
 )
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (

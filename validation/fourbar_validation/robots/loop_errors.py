@@ -18,7 +18,7 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     FORCE_QUANTITIES,
     InsideAnswer,
     LoopMeasurement,

@@ -28,13 +28,13 @@ from fourbar_validation.compare.rows import (
     write_csv_rows,
     write_results,
 )
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     LoopMeasurement,
     RobotMeasurement,
     SettingsAdvice,
     TriedSettings,
+    name_following,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import name_following
 from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import escape_cell, write_error
 from fourbar_validation.robots.judge_loop import LoopJudgement

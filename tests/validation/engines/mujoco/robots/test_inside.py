@@ -20,12 +20,12 @@ from fourbar.scene import Command
 from fourbar.scene.motion import CROSSED, OPEN
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     FORCE_QUANTITIES,
     make_motion,
     measure_sizes,
 )
-from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import put_loop_inside
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene

@@ -15,7 +15,7 @@ import fourbar
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.scene import find_signs
 from fourbar_validation.engines.free_body_closure import close
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     FORCE_QUANTITIES,
     RobotMeasurement,
 )

@@ -11,9 +11,11 @@ from pytest import approx, raises
 from scipy.optimize import brentq
 
 from fourbar.errors import InputError
-from fourbar_validation.engines.mujoco.robots.answers import make_motion
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    RobotFile,
+    make_motion,
+)
 from fourbar_validation.engines.mujoco.robots.settings import (
     STIFFEST_IMPEDANCE,
     SettingsSearch,

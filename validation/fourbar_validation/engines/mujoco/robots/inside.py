@@ -49,27 +49,23 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_joint,
     takes_control,
 )
-from fourbar_validation.engines.mujoco.robots.answers import (
-    OTHER_ASSEMBLY,
-    InsideAnswer,
-    TornState,
-    record_states,
-    varies,
-)
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
-from fourbar_validation.engines.mujoco.robots.forces import (
-    BearerForces,
-    read_equality_force,
-)
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     DRIVEN_PINS,
     FOLLOWING,
+    OTHER_ASSEMBLY,
+    InsideAnswer,
     RobotLoop,
+    TornState,
     is_in_line,
+    record_states,
+    varies,
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
+    BearerForces,
     copy_for_closures,
     evaluate_closures,
+    read_equality_force,
 )
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, list_bars
 from fourbar_validation.engines.mujoco.runner import Stepper

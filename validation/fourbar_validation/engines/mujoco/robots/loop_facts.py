@@ -1,17 +1,22 @@
-"""Questions to a robot's file, and facts on its closed loops.
+"""Questions to a robot's file, facts on its closed loops, and MuJoCo's results on them.
 
 Everything here is plain data, without MuJoCo.
 """
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
-from fourbar.quantities import Array
-from fourbar.scene import Scene
+from fourbar.quantities import PIN_FORCES, Array
+from fourbar.scene import Command, Scene, command
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED
+from fourbar_validation.engines.description import list_unknowns
 
 BAR_ROLES = {BAR_NAMES[bar]: bar for bar in MOVING_BARS}
 """Number of each moving bar, by its name."""
@@ -227,3 +232,368 @@ def name_following(bar: int) -> str:
 def write_length(metres: float) -> str:
     """Write a length in mm with four significant digits."""
     return f"{1e3 * metres:#.4g}".rstrip(".")
+
+
+FORCE_QUANTITIES = ("torque", *PIN_FORCES)
+OTHER_ASSEMBLY = (
+    "MuJoCo goes over to the other assembly before the loop has settled; the motion of"
+    " a SCENE may start elsewhere"
+)
+"""Why a motion has no state that counts."""
+ROUND_OFF_OF_A_FILE = 1e-5
+"""Part of its terms below which a torque or a pin force is the rounding of a file.
+MuJoCo saves six significant digits: half of the last is up to 5e-6 of a length, and the
+difference of two lengths is off by twice as much.
+"""
+
+
+_FORCES = np.dtype([("torque", float), *((name, float, 2) for name in PIN_FORCES)])
+"""Couple of the drive, N m, or its force, N, and pin forces in the scene's axes, N."""
+MOTION_OF_BARS = [f"{rate}_{b}" for rate in ("theta", "omega") for b in MOVING_BARS]
+"""Angles (rad) and speeds (rad/s) of the moving bars in the scene's axes."""
+STATE = np.dtype(
+    [
+        ("angle", float),
+        ("speed", float),
+        ("acceleration", float),
+        ("joint", float),
+        ("soft", _FORCES),
+        ("rigid", _FORCES),
+        ("gap", float),
+        ("bars", [(name, float) for name in MOTION_OF_BARS]),
+        ("condition", float),
+    ]
+)
+"""One state of a loop in its robot.
+
+Angle, speed and acceleration are those of the commanded bar, rad, and the joint is the
+position of the driven one as the file counts it, rad. Soft are torque and pin forces as
+MuJoCo has them, rigid those with rigid pins at the closed state of the same command.
+The gap is the distance of the ends of the closure, m, and the bars are those of the
+state that MuJoCo evaluates. The condition is |sin| of the angle between the bars that
+follow in that closed state.
+"""
+
+
+def record_states(rows: Sequence[Any]) -> Any:
+    """Return states as a record array of STATE, (n,)."""
+    return np.array(rows, STATE).view(np.recarray)
+
+
+def make_motion(angles: Iterable[float], rates: Iterable[float]) -> Array:
+    """Return a motion at one speed, rad/s, and one acceleration, rad/s^2, (n, 3).
+
+    Its columns are angle, speed and acceleration of the commanded bar in the scene's
+    axes. `angles`: (n,), rad.
+    """
+    return np.array([(angle, *rates) for angle in angles])
+
+
+def varies(motion: Array) -> bool:
+    """Tell whether speed or acceleration differ from position to position."""
+    return bool(np.ptp(motion[:, 1:], axis=0).any())
+
+
+def thin_out(motion: Array, most: int) -> Array:
+    """Return a motion with at most so many positions, spread evenly.
+
+    Both ends are among them.
+    """
+    places = np.linspace(0, len(motion) - 1, min(len(motion), most))
+    return np.asarray(motion[places.round().astype(int)])
+
+
+def measure_sizes(values: Any) -> Array:
+    """Return the sizes of numbers (n,) or of vectors (n, 2), (n,)."""
+    numbers = np.asarray(values, dtype=float)
+    return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
+
+
+def find_scales(
+    sizes: Mapping[str, Array],
+    conditions: Array,
+    lever: float,
+) -> dict[str, float]:
+    """Return what the errors of torque and pin forces are divided by, N m and N.
+
+    The scale of each is its largest size. One that is the round-off of its terms at
+    every well-conditioned state is a sum that cancels: its scale is that of the terms,
+    the largest pin force, for the torque times the longest moving bar.
+
+    Parameters
+    ----------
+    sizes : size of the torque and of each pin force at each state, (n,), N m and N.
+    conditions : |sin| of the angle between the bars that follow at each state, (n,).
+    lever : longest moving bar, m; 1 where the drive is a force.
+    """
+    force = np.max([sizes[name] for name in PIN_FORCES], axis=0)
+    well = conditions >= WELL_CONDITIONED
+    scales = {}
+    for name in FORCE_QUANTITIES:
+        terms = force
+        if name == "torque":
+            terms = force * lever
+        cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
+        vanishes = well.any() and cancels[well].all()
+        scale = terms if vanishes else sizes[name]
+        scales[name] = float(scale.max())
+    return scales
+
+
+def divide(error: float, scale: float) -> float:
+    """Return an error over its scale; without a scale it is infinite, or zero."""
+    if scale and math.isfinite(error):
+        return error / scale
+    return math.inf if error else 0.0
+
+
+class WorstState(NamedTuple):
+    """State at which one of the torque and the pin forces has the worst error."""
+
+    error: float
+    """Error over the scale of the quantity; infinite without an answer."""
+    quantity: str = ""
+    joint: float = math.nan
+    """Position of the driven joint, rad."""
+    angle: float = math.nan
+    """Angle of the commanded bar in the plane of the loop, rad."""
+
+
+@dataclass(slots=True)
+class InsideAnswer:
+    """Results of MuJoCo on a loop at some states of the whole robot."""
+
+    rows: Any = field(default_factory=lambda: record_states([]))
+    """Record array of STATE, (n,)."""
+    in_line: list[float] = field(default_factory=list)
+    """Positions of the driven joint that are left out, because the bars that follow are
+    in line there, rad.
+    """
+    open: list[float] = field(default_factory=list)
+    """Angles of the commanded bar at which the loop does not close, rad."""
+    settling: float = 0.0
+    """Time after the start in which no state is judged, because the loop yields, s."""
+    skipped: int = 0
+    """Angles that the motion passes in this time."""
+    lost: str = ""
+    """Why the run ended early; empty where it did not."""
+    other_assembly: float | None = None
+    """Position of the driven joint from which on the simulated loop is in the other
+    assembly, rad: no state counts from there on.
+    """
+    seconds_per_step: float = math.nan
+    """Processor time of a step of the whole robot between two states, the least, s."""
+
+    def errors(self) -> dict[str, Array]:
+        """Return the size of the error of torque and pin forces, (n,), N m and N."""
+        soft = self.rows.soft
+        rigid = self.rows.rigid
+        return {
+            name: measure_sizes(soft[name] - rigid[name]) for name in FORCE_QUANTITIES
+        }
+
+    def sizes(self) -> dict[str, Array]:
+        """Return the sizes of torque and pin forces of rigid pins, (n,), N m and N."""
+        rigid = self.rows.rigid
+        return {name: measure_sizes(rigid[name]) for name in FORCE_QUANTITIES}
+
+    def scales(self, lever: float) -> dict[str, float]:
+        """Return what errors are divided by, from rigid pins, as `find_scales` does."""
+        return find_scales(self.sizes(), self.rows.condition, lever)
+
+    def find_worst(self, scales: Mapping[str, float]) -> WorstState:
+        """Return the state of the worst error of torque and pin forces over its scale.
+
+        The error is infinite without an answer.
+        """
+        if self.lost or not len(self.rows):
+            return WorstState(math.inf)
+        return max(
+            WorstState(divide(float(error), scales[name]), name, row.joint, row.angle)
+            for name, errors in self.errors().items()
+            for row, error in zip(self.rows, errors, strict=True)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TornState:
+    """State of the largest gap under a motor's torque."""
+
+    joint: float
+    """Position of the driven joint, rad."""
+    gap: float
+    """m; infinite where MuJoCo lost the motion."""
+    forces: Array
+    """Of PIN_FORCES in the scene's axes, (4, 2), N; empty without an answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class TriedSettings:
+    """Settings and what they reach in the robot's file."""
+
+    changes: Mapping[str, str]
+    """Attributes of MJCF that differ from the file's, as they are typed."""
+    states: WorstState
+    """Worst single state."""
+    through_time: WorstState
+    """Worst state of a simulation."""
+    gap: float
+    """Largest gap of the simulation, m."""
+    seconds_per_step: float
+    """Processor time of a step of the whole robot, s; infinite if it was not stepped.
+    """
+    cost: float
+    """Processor time of a simulated second, s."""
+
+    @property
+    def deciding(self) -> WorstState:
+        """State of the greater of the two errors."""
+        return max(self.states, self.through_time)
+
+    @property
+    def error(self) -> float:
+        """The greater of the two errors."""
+        return self.deciding.error
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsAdvice:
+    """Settings and errors of one loop, for one wanted error."""
+
+    wanted: float
+    positions: int
+    """Number of positions at which settings are tried."""
+    before: TriedSettings
+    alone: tuple[TriedSettings, ...]
+    """Each setting changed by itself, the one that helps most first."""
+    best: TriedSettings
+    """Cheapest combination within the wanted error, or the most accurate one tried."""
+    tried: int
+    typed: tuple[str, ...]
+    """The best combination as elements of MJCF."""
+    within: tuple[float, float] | None
+    """Widest range of the driven joint found, rad, in which the best combination is
+    within the wanted error. None where it is so everywhere, or in no range tried.
+    """
+
+    @property
+    def reached(self) -> bool:
+        """Tell whether the best combination is within the wanted error."""
+        return self.best.error <= self.wanted
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureOptions:
+    """Request for measurements of the loops of a robot."""
+
+    pose: PoseOptions
+    loop: str | None = None
+    """Name of a closure; None: all four-bars."""
+    speed: float | None = None
+    """Speed of the driven bar, rad/s; None: that of the scene."""
+    torque: float | None = None
+    """Torque of the motor under which the loop may come apart, N m. None: it is not
+    asked.
+    """
+    error: float | None = None
+    """Error for which settings are looked for; None: none are."""
+    span: tuple[float, float] | None = None
+    """Range of the driven joint, rad; None: that of the scene."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Bodies of the bars and sites of pin B that are stated, by their roles."""
+
+    def state_speed(self, scene: Scene) -> Scene:
+        """Return a scene at the speed that is stated, if one is."""
+        if self.speed is None:
+            return scene
+        return replace(scene, motion=scene.motion.replace(speed=self.speed))
+
+
+@dataclass(frozen=True, slots=True)
+class LoopMeasurement:
+    """Results of MuJoCo on one loop in its whole robot."""
+
+    name: str
+    joint: str
+    """Joint that is driven."""
+    scene: Scene
+    """Scene of the loop, in which the formulas are asked."""
+    remarks: tuple[str, ...]
+    setting: str
+    """Integrator and timestep of the file."""
+    rounding: float
+    """Sum by which the lengths of the scene differ from the file's within its digits,
+    m.
+    """
+    held: int
+    """Number of degrees of freedom that are held."""
+    switched_off: tuple[str, ...]
+    """Equalities between its moving bars and joints that are held."""
+    states: InsideAnswer
+    scales: dict[str, float]
+    """Scale of the errors of torque and of each pin force, N m and N."""
+    through_time: InsideAnswer | None
+    refusal: str
+    """Why it was not simulated; empty where it was."""
+    torn: list[TornState]
+    advice: SettingsAdvice | None
+    as_it_is: bool
+    """True if contacts, joint limits and other motors acted as in the file."""
+    flywheel: float
+    """Armature of the driven hinge that drives, kg m^2."""
+    unmet_stops: list[int]
+    """Hinges of the loop whose stops ended no state."""
+
+    @property
+    def left_assembly(self) -> bool:
+        """Tell whether the simulation went over to the other assembly."""
+        through = self.through_time
+        left = through is not None and through.other_assembly is not None
+        return left or self.refusal == OTHER_ASSEMBLY
+
+    def command(self, answer: InsideAnswer) -> Command:
+        """Return the command of an answer.
+
+        The states that are answered come first, then the angles that are open.
+        """
+        rows = answer.rows
+        more = (0, len(answer.open))
+        return Command(
+            np.append(rows.angle, answer.open),
+            np.full(len(rows) + len(answer.open), self.scene.motion.branch, np.int8),
+            np.pad(rows.speed, more, "edge"),
+            np.pad(rows.acceleration, more, "edge"),
+            bar=command(self.scene).bar,
+        )
+
+    def collect(self, answer: InsideAnswer, which: str) -> dict[str, Array]:
+        """Return what the drive exerts (n,), and the pin forces (n, 2), of an answer.
+
+        The names are those of the scene, N m and N. `which`: "soft" or "rigid".
+        """
+        forces = answer.rows[which]
+        names = list_unknowns(self.scene, FORCE_QUANTITIES)
+        pairs = zip(names, FORCE_QUANTITIES, strict=True)
+        return {name: np.asarray(forces[field]) for name, field in pairs}
+
+    def find_vanishing(self, quantity: str) -> float | None:
+        """Return the scale of the terms of a quantity that is their rounding."""
+        sizes = self.states.sizes()
+        scale = self.scales.get(quantity)
+        if scale is None or scale == float(sizes[quantity].max()):
+            return None
+        return scale
+
+    @property
+    def moves(self) -> bool:
+        """Tell whether the scene names a motion and not a few states at rest."""
+        speeds = self.states.rows.speed
+        return bool(speeds.any()) and len(speeds) + len(self.states.open) > 1
+
+
+@dataclass(frozen=True, slots=True)
+class RobotMeasurement:
+    """Results of MuJoCo on the loops of a robot's file."""
+
+    loops: tuple[LoopMeasurement, ...]
+    notes: tuple[str, ...]

@@ -40,17 +40,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     describe_actuator,
     name_joint,
 )
-from fourbar_validation.engines.mujoco.robots.answers import (
-    InsideAnswer,
-    LoopMeasurement,
-    MeasureOptions,
-    RobotMeasurement,
-    TornState,
-    make_motion,
-    measure_sizes,
-    thin_out,
-    varies,
-)
 from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
@@ -59,8 +48,17 @@ from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     SETTINGS_OF_AN_SDF,
+    InsideAnswer,
+    LoopMeasurement,
+    MeasureOptions,
     PoseOptions,
     RobotFile,
+    RobotMeasurement,
+    TornState,
+    make_motion,
+    measure_sizes,
+    thin_out,
+    varies,
 )
 from fourbar_validation.engines.mujoco.robots.loop_scene import (
     make_loop_scene,

@@ -27,13 +27,13 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_closing,
     name_body,
 )
-from fourbar_validation.engines.mujoco.robots.answers import MeasureOptions
 from fourbar_validation.engines.mujoco.robots.closures import find_loops
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
     FLAT,
     SITE_ROLES,
+    MeasureOptions,
     RobotFile,
     RobotLoop,
     is_in_line,

@@ -28,16 +28,17 @@ from fourbar_validation.engines.mujoco.describe import (
     word_of_number,
 )
 from fourbar_validation.engines.mujoco.robots.ancestry import is_enabled, name_joint
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     InsideAnswer,
+    RobotFile,
+    RobotLoop,
     SettingsAdvice,
     TriedSettings,
     WorstState,
     make_motion,
     thin_out,
 )
-from fourbar_validation.engines.mujoco.robots.inside import LoopInside
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, RobotLoop
 
 SEARCH_SECONDS = 75.0
 """Processor time in which combinations are tried, s. With the rest the command stays

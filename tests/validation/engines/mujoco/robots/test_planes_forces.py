@@ -16,7 +16,7 @@ from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar_validation.cli import status
 from fourbar_validation.engines.mujoco.robots.ancestry import list_lifted_masses
-from fourbar_validation.engines.mujoco.robots.forces import (
+from fourbar_validation.engines.mujoco.robots.planes import (
     BearerForces,
     read_equality_force,
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from fourbar_validation.engines.mujoco.robots.answers import (
+from fourbar_validation.engines.mujoco.robots.loop_facts import (
     divide,
     find_scales,
 )
