@@ -294,9 +294,7 @@ class LoopInside:
 
     def _read_position(self, qpos: Array) -> float:
         """Return the position of the driven joint in a pose, as `position` does."""
-        if self.joint is None:
-            return self.angle(qpos)
-        return float(qpos[self.model.jnt_qposadr[self.joint]])
+        return self.position(self.angle(qpos))
 
     def close(self, wanted: float) -> Array | None:
         """Return the pose at an angle of the commanded bar, or None if it is open.
@@ -813,14 +811,6 @@ def _measure_drift(data: mujoco.MjData, speeds: Array) -> Array:
 def _has_warned(data: mujoco.MjData) -> bool:
     """Tell whether MuJoCo has warned that it loses the motion."""
     return any(data.warning[kind].number for kind in WARNINGS)
-
-
-def reflect(model: mujoco.MjModel, loop: RobotLoop, bar: int = 2) -> Array | None:
-    """Return the pose of the other assembly at the same angle of a bar, (nq,).
-
-    None where it does not close.
-    """
-    return LoopInside(model, loop, bar=bar).reflect()
 
 
 def _list_instants(

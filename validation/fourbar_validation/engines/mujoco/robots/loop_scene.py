@@ -47,7 +47,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.inside import reflect
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     LoopScene,
     PoseOptions,
@@ -527,7 +527,8 @@ class SceneOfLoop(SeenLoop):
                 " the pose before closing, which does not tell the assembly: it closed"
                 f" to the {BRANCH_NAMES[branch]} one"
             )
-            if pose := write_pose(self.model, loop, reflect(self.model, loop)):
+            reflected = LoopInside(self.model, loop).reflect()
+            if pose := write_pose(self.model, loop, reflected):
                 text += f"; --pose {pose} closes to the other"
         else:
             return

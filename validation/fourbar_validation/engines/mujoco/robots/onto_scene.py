@@ -28,7 +28,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_body,
 )
 from fourbar_validation.engines.mujoco.robots.closures import find_loops
-from fourbar_validation.engines.mujoco.robots.inside import LoopInside, reflect
+from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     BAR_ROLES,
     FLAT,
@@ -236,7 +236,7 @@ def close_onto(
         posed = move_to(posed, _leave_flat(scene, posed, seen))
         seen = _place(seen, posed)
     ways = [(seen, posed)]
-    reflected = reflect(posed.model, seen, bar)
+    reflected = LoopInside(posed.model, seen, bar=bar).reflect()
     if reflected is not None:
         there = move_to(posed, reflected)
         ways.append((_place(seen, there), there))

@@ -80,13 +80,9 @@ class LoopFrame:
 
     def resolve(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector of the world along a bar's line and to its left."""
-        x, y = self.in_plane(vector)
         line = self.line(bar)
-        size = abs(line)
-        return (
-            float(line.real * x + line.imag * y) / size,
-            float(line.real * y - line.imag * x) / size,
-        )
+        along = complex(*self.in_plane(vector)) * line.conjugate() / abs(line)
+        return along.real, along.imag
 
     def along_bar(self, bar: int, place: Array) -> tuple[float, float]:
         """Return (along, to the left) of a place from a bar's first pin, m."""
