@@ -20,6 +20,7 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     EQUALITY_KINDS,
     climb,
+    find_bits,
     find_ends,
     find_named,
     find_parent,
@@ -45,9 +46,10 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
     PARALLEL,
+    copy_for_closures,
     find_mean_axis,
     find_normals,
-    find_offset,
+    read_equality_force,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     BALL,
@@ -804,13 +806,20 @@ def _describe_offset(
 
     The list is empty where they lie in one plane.
     """
-    offset, across, in_plane = find_offset(
-        posed.model, posed.data.qpos, closures, normal
-    )
+    alone = copy_for_closures(posed.model, closures)
+    alone.opt.disableflags |= find_bits("frictionloss")
+    data = mujoco.MjData(alone)
+    data.qpos[:] = posed.data.qpos
+    mujoco.mj_forward(alone, data)
+    ends = (find_ends(alone, data, number) for number in closures)
+    offset = max(abs(float((first - second) @ normal)) for first, second in ends)
     if offset <= COINCIDENT_PINS * max(loop.lengths):
         return []
+    total = np.sum([read_equality_force(data, one) for one in closures], axis=0)
+    across = float(total @ normal)
+    in_plane = float(np.linalg.norm(total - across * normal))
     return [
         f"its ends are {write_length(offset)} mm apart along the axes, which no motion"
-        f" closes: MuJoCo's constraint carries {across:.4g} N across the plane and"
+        f" closes: MuJoCo's constraint carries {abs(across):.4g} N across the plane and"
         f" {in_plane:.4g} N in it, let go at rest in this pose"
     ]

@@ -18,7 +18,6 @@ from fourbar_validation.engines.mujoco.closed_loop import find_site_load
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
     find_bits,
-    find_ends,
     find_tied_bodies,
     list_closing,
     list_joints_between,
@@ -113,32 +112,6 @@ def copy_for_closures(
     alone.eq_active0[:] = 0
     alone.eq_active0[[*closures]] = 1
     return alone
-
-
-def find_offset(
-    model: mujoco.MjModel,
-    qpos: Array,
-    closures: Iterable[int],
-    normal: Array,
-) -> tuple[float, float, float]:
-    """Return how far the ends of closures are apart along the normal, and the forces.
-
-    The largest distance is in m. The forces are those that the closures carry where the
-    robot is let go at rest in a pose, along the normal and in the plane, N.
-    """
-    alone = copy_for_closures(model, closures)
-    alone.opt.disableflags |= find_bits("frictionloss")
-    data = mujoco.MjData(alone)
-    data.qpos[:] = qpos
-    mujoco.mj_forward(alone, data)
-    offset = 0.0
-    total = np.zeros(3)
-    for number in closures:
-        first, second = find_ends(alone, data, number)
-        offset = max(offset, abs(float((first - second) @ normal)))
-        total += read_equality_force(data, number)
-    across = float(total @ normal)
-    return offset, abs(across), float(np.linalg.norm(total - across * normal))
 
 
 class BearerForces:
