@@ -17,6 +17,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     make_motion,
 )
 from fourbar_validation.engines.mujoco.robots.settings import (
+    SOLVER,
     STIFFEST_IMPEDANCE,
     SettingsSearch,
     set_settings,
@@ -69,12 +70,15 @@ def test_what_is_set_in_a_model_is_read_from_it():
     changes |= {"solver": "CG", "tolerance": "0.001", "solref": "0.1 0.5"}
     changes["solimp"] = STIFFEST_IMPEDANCE
     motion = make_motion((loop.angles[1],), (2.0, 0.0))
-    own, others = (
-        SettingsSearch(LoopInside(one, loop), motion).own
-        for one in (model, set_settings(model, loop, changes))
+    finer = {"iterations": "200", "tolerance": "1e-12"}
+    own, others, fine = (
+        SettingsSearch(LoopInside(set_settings(model, loop, one), loop), motion)
+        for one in ({}, changes, finer)
     )
-    assert others == own | changes
-    assert all(own[name] != changes[name] for name in changes)
+    assert others.own == own.own | changes
+    assert all(own.own[name] != changes[name] for name in changes)
+    assert own.solver == {"tolerance": "1e-10"}
+    assert others.solver == SOLVER and fine.solver == {}
 
 
 @pytest.mark.slow

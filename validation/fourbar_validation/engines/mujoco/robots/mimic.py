@@ -156,31 +156,33 @@ class _RestPose:
                 # the equality turns the output while the leader is at its zero
                 turn = sense * coefficients[0]
         low, high = model.jnt_range[leader].tolist()
+        limits = (low, high) if model.jnt_limited[leader] else None
         ground = linkage.ground_angle
-        equality = JointEquality(
-            name_joint(model, follower),
-            name_joint(model, leader),
-            coefficients,
-            float(model.qpos0[model.jnt_qposadr[leader]]),
-            sense,
-            math.nan if stated is None else stated,
-            math.nan,
-            1.0,
-            True,
-            bars,
-            (low, high) if model.jnt_limited[leader] else None,
-        )
-        told = self._find_side((*angles[:3], angles[3] + turn), equality)
-        side = told or 1.0
         turned, bearer = (angles[bar - 1] for bar in bars)
-        zero = side * (turned - bearer) + (ground if bars[1] == 1 else 0.0)
-        return replace(
-            equality,
-            theta_2=ground + side * angles[1] if stated is None else stated,
-            follower_zero=zero if 3 in bars or rocker == follower else math.nan,
-            side=side,
-            is_side_told=told is not None or (stated is None and math.isnan(angles[1])),
-        )
+
+        def see(side: float) -> JointEquality:
+            """Describe the equality as it is seen from the tip, +1, or from behind."""
+            zero = side * (turned - bearer) + (ground if bars[1] == 1 else 0.0)
+            return JointEquality(
+                name_joint(model, follower),
+                name_joint(model, leader),
+                coefficients,
+                float(model.qpos0[model.jnt_qposadr[leader]]),
+                sense,
+                ground + side * angles[1],
+                zero if 3 in bars or rocker == follower else math.nan,
+                side,
+                True,
+                bars,
+                limits,
+            )
+
+        ways = (see(1.0), see(-1.0))
+        posed = (*angles[:3], angles[3] + turn)
+        tip, behind = (self._list_evidence(way, posed, stated) for way in ways)
+        is_told = tip != behind or (stated is None and math.isnan(angles[1]))
+        seen = replace(ways[behind > tip], is_side_told=is_told)
+        return seen if stated is None else replace(seen, theta_2=stated)
 
     def _find_bars(self, follower: int) -> tuple[int, int]:
         """Return the bar that a follower turns, and the bar that bears it."""
@@ -219,36 +221,26 @@ class _RestPose:
                 return joint
         return None
 
-    def _find_side(
-        self, angles: tuple[float, ...], equality: JointEquality
-    ) -> float | None:
-        """Return +1 if a scene sees the leader's axis from its tip, -1 from behind.
+    def _list_evidence(
+        self, seen: JointEquality, angles: tuple[float, ...], stated: float | None
+    ) -> tuple[bool, ...]:
+        """Tell by what a side is that of the scene; what comes first decides.
 
-        The stated or the drawn theta_2 decides. Where it does not, the scene's output
-        does, and last the side from which the leader's range meets the scene's. The
-        result is None if none of them tells. `angles`: theta_1 to theta_4 in the file,
+        It is the stated or the drawn theta_2, then the scene's output, and last the
+        leader's range that meets the scene's. `angles`: theta_1 to theta_4 in the file,
         seen from the tip, rad, NaN if it does not tell them.
         """
         scene = self.scene
-        shown = equality.theta_2
-        if math.isnan(shown) and scene.drawing is not None:
+        shown = stated
+        if shown is None and scene.drawing is not None:
             shown = scene.drawing.angle(2)
-        positions = command(scene).theta_2
-        moved = (float(positions.min()), float(positions.max()))
-
-        def list_evidence(side: float) -> tuple[bool, ...]:
-            rest = scene.linkage.ground_angle + side * angles[1]
-            swing = replace(equality, side=side, theta_2=rest).swing
-            return (
-                is_same_angle(rest, shown),
-                is_seen_from_behind(scene, [-side * angle for angle in angles]),
-                swing is not None and _meet(swing, moved),
-            )
-
-        tip, behind = map(list_evidence, (1.0, -1.0))
-        if tip == behind:
-            return None
-        return 1.0 if tip > behind else -1.0
+        theta_2 = command(scene).theta_2
+        moved = (float(theta_2.min()), float(theta_2.max()))
+        return (
+            shown is not None and is_same_angle(seen.theta_2, shown),
+            is_seen_from_behind(scene, [-seen.side * angle for angle in angles]),
+            seen.swing is not None and _meet(seen.swing, moved),
+        )
 
     def _find_angle(self, joint: int, bar: Bar) -> float:
         """Return the angle of a bar from its hinge to its other pin, rad.
