@@ -81,6 +81,20 @@ def test_what_is_set_in_a_model_is_read_from_it():
     assert others.solver == SOLVER and fine.solver == {}
 
 
+def test_what_steps_faster_changes_less_and_is_softer_is_tried_first():
+    rank = search(read_robot(FOOT))._rank
+    order = [
+        {"timestep": "0.002"},
+        {},
+        {"solref": "0.004 1"},
+        {"solref": "0.002 1"},
+        {"solref": "0.002 1", "solimp": STIFFEST_IMPEDANCE},
+        {"timestep": "0.0005"},
+        {"integrator": "RK4"},
+    ]
+    assert sorted(reversed(order), key=rank) == order
+
+
 @pytest.mark.slow
 def test_what_is_typed_reaches_the_error_that_was_wanted():
     file = read_robot(FOOT)
