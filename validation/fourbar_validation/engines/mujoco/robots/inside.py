@@ -551,9 +551,14 @@ class LoopInside:
         needed += rubbing.T @ (limits * np.sign(rubbing @ state.qvel))
         needed -= self.turn * self.flywheel * wanted
         pull = self.turn if self.acting is None else self.acting.find_pull(data)
-        # M a + c = J^T f + pull s on the hinges of the loop
-        columns = np.column_stack([rows.T, pull])[self.moving]
-        *multipliers, size = _solve_least_squares(columns, needed[self.moving]).tolist()
+        # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
+        # is across the pull
+        level = pull[self.moving] / np.linalg.norm(pull[self.moving])
+        away = np.eye(len(self.moving)) - np.outer(level, level)
+        columns = rows[:, self.moving].T
+        multipliers = _solve_least_squares(away @ columns, away @ needed[self.moving])
+        left = needed[self.moving] - columns @ multipliers
+        size = float(left @ level / np.linalg.norm(pull[self.moving]))
         data.qacc[:] = accelerations
         data.efc_force[: data.ne] = multipliers
         if self.acting is not None:
