@@ -66,9 +66,13 @@ def test_a_complaint_of_mujoco_names_the_element_and_no_line_of_another_text(tmp
 
 
 def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path):
-    robot = compile_robot(read_robot(make(tmp_path)))
+    path = make(tmp_path)
+    fixed = '<body name="base"><geom type="mesh" mesh="part"/></body><body name="arm">'
+    path.write_text(path.read_text().replace('<body name="arm">', fixed))
+    robot = compile_robot(read_robot(path))
     body = robot.model.body("arm").id
     assert robot.unknown_masses == (body,)
+    assert not robot.model.geom_contype.any() and not robot.model.geom_conaffinity.any()
     assert "masses of arm are unknown" in robot.notes[1]
     with pytest.raises(InputError, match="--assets DIR"):
         list_unknown_parts(robot, {body})
