@@ -154,15 +154,12 @@ def _list_samples(question):
     if not len(swept):
         raise NotAskedError("the linkage assembles at none of its positions")
     first = swept[0]
-    away = math.inf
-    for start, stop in find_intervals(
-        linkage
-    ):  # at an end of one it is in it but for rounding
+    reached = []
+    for start, stop in find_intervals(linkage):
+        half = 0.5 * (stop - start)
         middle = first - math.remainder(first - 0.5 * (start + stop), turn)
-        if (outside := abs(first - middle) - 0.5 * (stop - start)) < away:
-            low = middle - 0.5 * (stop - start)
-            high = middle + 0.5 * (stop - start)
-            away = outside
+        reached.append((abs(first - middle) - half, middle - half, middle + half))
+    _, low, high = min(reached)  # at an end it is outside by rounding
     if isinstance(motion.angle, Sweep) or motion.law is not None:
         if turns_fully(linkage):
             low = first - 2.0 * turn

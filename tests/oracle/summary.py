@@ -298,7 +298,7 @@ def _judge_drive(judged):
         return
     name = name_driving(judged.scene)
     fine_values, fine_speed = _find_work(judged, judged.fine)
-    kind = "force" if facts.linear else "torque"
+    kind = name.removeprefix("drive_")
     if name not in judged.growing:
         at_peak, _ = _find_work(judged, judged.ask(facts.peak.place))
         judged.add_peak("peaks", facts.peak, at_peak, fine_values)
@@ -373,7 +373,7 @@ def _judge_integrals(judged):
             judge_mean(entry["pins"][pin]["rms"], name)
     if not judged.drives:
         return
-    judge_mean(entry[f"rms_{'force' if judged.facts.linear else 'torque'}"], drive)
+    judge_mean(entry[f"rms_{drive.removeprefix('drive_')}"], drive)
     judge_mean(entry["rms_power"], "power")
     motion = judged.scene.motion
     second = 1.0 if motion.law is not None else abs(motion.speed or 0.0)
