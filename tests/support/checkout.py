@@ -38,13 +38,19 @@ def wait_until(ready, seconds):
         time.sleep(0.01)
 
 
+def run_line(line, folder=ROOT, **how):
+    """Run a program, and return how it ended."""
+    return subprocess.run(
+        line, cwd=folder, capture_output=True, text=True, check=False, **how
+    )
+
+
 def run_python(*words, folder=ROOT, **variables):
     """Run Python with further variables in its environment, and return how it ended."""
-    return subprocess.run(
-        [sys.executable, *map(str, words)],
-        cwd=folder,
-        env=os.environ | variables,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    line = [sys.executable, *map(str, words)]
+    return run_line(line, folder, env=os.environ | variables)
+
+
+def join_paths(*folders):
+    """Return a PYTHONPATH of some folders and those of the packages."""
+    return os.pathsep.join(map(str, (*folders, ROOT, ROOT / "validation")))

@@ -2,7 +2,6 @@
 
 from collections import Counter
 
-from fourbar_validation.engines import workers
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run.judge import judge
@@ -47,4 +46,5 @@ def judge_here(monkeypatch):
         for number, items in tasks:
             yield number, [function(item) for item in items]
 
-    monkeypatch.setattr(workers, "apply_over_processes", over_none)
+    over_processes = "fourbar_validation.engines.workers.apply_over_processes"
+    monkeypatch.setattr(over_processes, over_none)

@@ -20,6 +20,7 @@ from fourbar.errors import INTERRUPTED
 from tests.support.checkout import BUSY, ROOT, run_python, wait_until
 from tests.support.guests import list_processes
 
+pytestmark = pytest.mark.slow
 PATIENCE = 8.0 * BUSY
 """Seconds after which nothing may be left, as SECURITY.md promises."""
 ENDLESS_MJCF = """<mujoco><worldbody><replicate count="20000" offset="0.1 0 0">
@@ -87,7 +88,6 @@ def leaving_nothing(mark):
             os.kill(left, signal.SIGKILL)
 
 
-@pytest.mark.slow
 @pytest.mark.linux
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.timeout(120 + 10 * KILLS)
@@ -114,7 +114,6 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
             assert process.returncode == INTERRUPTED
 
 
-@pytest.mark.slow
 @pytest.mark.posix
 @pytest.mark.parametrize(
     ("program", "status"),

@@ -12,7 +12,6 @@ import pytest
 import fourbar.cli
 import fourbar_validation.cli
 from fourbar.errors import BAD_INPUT, InputError
-from fourbar.evaluation import free_motion
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.checkout import ROOT, read_complaint
 
@@ -81,7 +80,8 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
 ):
     file, out = tmp_path / "released.toml", tmp_path / "out.csv"
     file.write_text(RELEASED)
-    monkeypatch.setattr(free_motion, "MOST_INTEGRATION_STEPS", 500)
+    most = "fourbar.evaluation.free_motion.MOST_INTEGRATION_STEPS"
+    monkeypatch.setattr(most, 500)
     assert fourbar.cli.status(["analyze", str(file), "-o", str(out)]) == BAD_INPUT
     complained = read_complaint(capsys)
     assert "released.toml: motion.free.duration = 1000000000.0" in complained

@@ -5,9 +5,8 @@ from importlib import import_module
 
 import pytest
 
-from tests.whole.test_imports import ROOT
+from tests.whole.test_imports import PACKAGES, ROOT
 
-PACKAGES = ("fourbar", "validation/fourbar_validation", "lab/fourbar_lab")
 MET_FIRST = {
     "fourbar.formulas": ("position", "motion", "pin_forces", "torque", "path"),
     "fourbar.effects": ("effect",),
@@ -21,8 +20,7 @@ MET_FIRST = {
 def find_modules():
     """Return the names of the modules whose docstrings have an example."""
     names = []
-    for package in PACKAGES:
-        folder = ROOT / package
+    for folder in PACKAGES.values():
         for path in sorted(folder.rglob("*.py")):
             if ">>> " in path.read_text("utf-8"):
                 module = path.relative_to(folder.parent).with_suffix("")

@@ -4,11 +4,10 @@ What is left is judged, and what is missing is named.
 """
 
 import csv
-import os
 
 import pytest
 
-from tests.support.checkout import ROOT, run_python
+from tests.support.checkout import join_paths, run_python
 
 pytestmark = pytest.mark.slow
 BLOCKER = """
@@ -55,9 +54,8 @@ def without(library, folder, *arguments, **settings):
     """`python -m validation run` where a library cannot be imported."""
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.toml").write_text(SCENE)
-    paths = os.pathsep.join((str(folder), str(ROOT), str(ROOT / "validation")))
     line = "-m validation run scene.toml --workers 1 --no-pictures --out out"
-    settings |= {"BLOCKED": f"{library} {NEVER}", "PYTHONPATH": paths}
+    settings |= {"BLOCKED": f"{library} {NEVER}", "PYTHONPATH": join_paths(folder)}
     return run_python(
         *line.split(), *arguments, folder=folder, COLUMNS="200", **settings
     )

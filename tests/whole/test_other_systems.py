@@ -5,7 +5,6 @@ are started by `spawn` everywhere; here nothing else can be had. What opens a te
 without saying its encoding makes Python warn.
 """
 
-import os
 from dataclasses import replace
 
 import pytest
@@ -15,8 +14,9 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import save
 from fourbar_validation.cli import status as harness
-from tests.support.checkout import ROOT, run_python
+from tests.support.checkout import ROOT, join_paths, run_python
 
+pytestmark = pytest.mark.slow
 HOSTILE = {
     "LC_ALL": "C",
     "PYTHONUTF8": "0",
@@ -42,7 +42,6 @@ def folder(tmp_path):
     return scene_folder
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "line"),
     [
@@ -59,10 +58,9 @@ def folder(tmp_path):
     ],
 )
 def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
-    path = os.pathsep.join([str(ROOT), str(ROOT / "validation")])
     words = ["-X", "warn_default_encoding", "-c", BEGIN.format(module=module)]
     words += line.format(models=ROOT / "models").split()
-    done = run_python(*words, folder=folder, PYTHONPATH=path, **HOSTILE)
+    done = run_python(*words, folder=folder, PYTHONPATH=join_paths(), **HOSTILE)
     # a bar of the model of `check-mjcf` is heavier
     assert done.returncode == ("check-mjcf" in line), done.stderr
     assert not [
@@ -72,7 +70,6 @@ def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
     ]
 
 
-@pytest.mark.slow
 def test_line_ends_of_windows_are_read(folder, capsys):
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS

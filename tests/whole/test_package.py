@@ -27,7 +27,7 @@ from fourbar.errors import BAD_INPUT, BROKEN, HOLDS, say_install
 from fourbar.files import save
 from fourbar_lab.cli import status as lab
 from fourbar_validation.cli import status as harness
-from tests.support.checkout import ROOT, read, read_complaint
+from tests.support.checkout import ROOT, read, read_complaint, run_line
 from tests.support.scenes import crank_rocker
 from tests.whole.test_imports import imported
 
@@ -189,18 +189,11 @@ def installed_works(python, package, folder, constraints):
     (folder / "constraints.txt").write_text("\n".join(constraints))
     install = [its_python, "-m", "pip", "install", "-q", package]
     subprocess.run([*install, "-c", folder / "constraints.txt"], check=True)
-    environment = {**os.environ}
-    environment.pop("PYTHONPATH", None)
+    environment = {**os.environ, "PYTHONPATH": ""}
 
     def run(line, program="fourbar", status=HOLDS):
-        done = subprocess.run(
-            [folder / "bin" / program, *line.split()],
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        words = [folder / "bin" / program, *line.split()]
+        done = run_line(words, folder, env=environment)
         assert done.returncode == status, done.stderr
         return done.stdout + done.stderr
 
@@ -253,13 +246,7 @@ def test_wheel_and_archive_install_on_every_python(tmp_path):
         here: sys.executable
     }
     for version, python in pythons.items():
-        if (
-            python
-            and subprocess.run(
-                [python, "--version"], capture_output=True, check=False
-            ).returncode
-            == 0
-        ):
+        if python and run_line([python, "--version"]).returncode == 0:
             installed_works(python, wheel, tmp_path / version, [])
     installed_works(
         sys.executable,

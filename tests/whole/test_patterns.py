@@ -9,9 +9,8 @@ import time
 
 import pytest
 
-from tests.support.checkout import ROOT, read
+from tests.whole.test_imports import PACKAGES, ROOT, parse
 
-FOLDERS = ("fourbar", "validation/fourbar_validation", "lab/fourbar_lab")
 FUNCTIONS = {
     "compile",
     "match",
@@ -69,9 +68,9 @@ exponential one cannot.
 
 def list_patterns():
     """List the literal patterns of the three packages, each with its place."""
-    for folder in FOLDERS:
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            for node in ast.walk(ast.parse(read(path))):
+    for folder in PACKAGES.values():
+        for path in sorted(folder.rglob("*.py")):
+            for node in ast.walk(parse(path)):
                 match node:
                     case ast.Call(
                         ast.Attribute(ast.Name("re"), name), [ast.Constant(pattern), *_]

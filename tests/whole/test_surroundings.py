@@ -12,7 +12,7 @@ import pytest
 
 from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
-from tests.support.checkout import ROOT
+from tests.support.checkout import ROOT, run_line
 
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 
@@ -48,15 +48,12 @@ def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(locked, line, end
         if shutil.which("setpriv") is None:
             pytest.skip("root has all rights, and setpriv takes none away")
         rights = ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner"]
-    done = subprocess.run(
+    done = run_line(
         [*rights, sys.executable, "-m", *line.split()],
-        cwd=locked,
+        locked,
         env=environment,
         stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
         timeout=100,
-        check=False,
     )
     assert done.returncode == ends, done.stderr
     if ends == HOLDS:

@@ -7,7 +7,6 @@ import re
 
 import pytest
 
-from fourbar_lab.simulators import findings as module
 from fourbar_lab.simulators.findings import (
     FIELDS,
     FINDINGS,
@@ -25,7 +24,8 @@ SECONDS = 100.0
 @pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
 def test_each_finding_holds_or_says_since_when_not(finding, monkeypatch):
     # no test makes an environment
-    monkeypatch.setattr(module, "read_engines", lambda folders: {})
+    engines = "fourbar_lab.simulators.findings.read_engines"
+    monkeypatch.setattr(engines, lambda folders: {})
     if (place := find_interpreter(finding)) is None:
         pytest.skip(f"not run: {finding.engine[0]} is not installed")
     since_fixed = not finding.fields["Until"].startswith("still")
