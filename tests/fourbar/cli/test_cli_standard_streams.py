@@ -12,18 +12,15 @@ from fourbar.cli import status
 from fourbar_validation.places import MODELS
 
 SCENE = MODELS / "crank_rocker.toml"
-TEXT = SCENE.read_bytes()
 
 
 @pytest.fixture
-def call(monkeypatch, capfdbinary, tmp_path, tmp_path_factory):
+def call(monkeypatch, capfdbinary, tmp_path):
     """Runs the command line with a scene on its standard input."""
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments, scene=TEXT):
-        piped = tmp_path_factory.mktemp("piped") / "scene"
-        piped.write_bytes(scene)
-        with piped.open(encoding="utf-8") as stream:
+    def run(*arguments):
+        with SCENE.open(encoding="utf-8") as stream:
             monkeypatch.setattr(sys, "stdin", stream)
             return status([*arguments]), *capfdbinary.readouterr()
 

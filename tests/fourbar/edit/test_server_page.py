@@ -13,7 +13,6 @@ from numpy.testing import assert_allclose
 from pytest import approx
 
 from fourbar import load, solve
-from fourbar.cli import status
 
 pytest.importorskip(
     "selenium",
@@ -270,9 +269,7 @@ def test_a_linkage_is_drawn_by_four_clicks_and_its_numbers_are_typed_over(page, 
     page.is_quiet()
 
 
-def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
-    page, path, capsys
-):
+def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(page, path, show):
     page.get(path)
     page.wait("offers && sketch")
     page.click_pins("1000 mm", (120, 300), (170, 180), (400, 120), (380, 330))
@@ -304,8 +301,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(
         solution.drive_force[np.abs(solution.stroke - stroke).argmin()],
         rel=PRINTED,
     )
-    assert status(["analyze", str(path), "--pressure", "210 bar"]) == 0
-    printed = capsys.readouterr().out
+    printed = show("analyze", path, "--pressure", "210 bar")
     assert " ".join(summary.split()).startswith(" ".join(printed.split()))
     assert "cylinder" in printed
     page.is_quiet()

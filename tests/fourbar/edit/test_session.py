@@ -79,8 +79,8 @@ def set_to(path, value, **more):
     return {"do": "set", "path": path.split("/"), "value": value, **more}
 
 
-def drawn(pins=PINS_DRAWN, unit="in", grain=1e-6):
-    return {"do": "draw", "pins": pins, "unit": unit, "grain": grain}
+def drawn(pins=PINS_DRAWN, grain=1e-6):
+    return {"do": "draw", "pins": pins, "unit": "in", "grain": grain}
 
 
 def pictured(kind, content):

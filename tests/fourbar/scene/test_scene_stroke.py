@@ -37,12 +37,11 @@ ENDS = {2: Place(2, (0.12, 0.4)), 4: Place(4, (0.15, -0.6))}
 GROUND = Place(1, (0.3, 2.2))
 
 
-def scene(bar, stroke, side="left", *, turned=False, **motion):
-    ends = (ENDS[bar], GROUND) if turned else (GROUND, ENDS[bar])
+def scene(bar, stroke, side="left", **motion):
     commanded = Motion(stroke=stroke, side=side, **motion)
     return crank_rocker(
         motion=commanded,
-        drive=LinearDrive(*ends),
+        drive=LinearDrive(GROUND, ENDS[bar]),
         effects=(fourbar.Gravity(),),
     )
 

@@ -77,9 +77,9 @@ omega_2 = "0 rad/s"
 """
 
 
-def hatch(extended="400 mm", stroke="150 mm", motion=SWEEP, more=""):
+def hatch(extended="400 mm", stroke="150 mm", motion=SWEEP):
     text = HATCH.replace("EXTENDED", extended).replace("STROKE", stroke)
-    return text.replace(SWEEP, motion) + more
+    return text.replace(SWEEP, motion)
 
 
 def spring(length, motion=SWEEP, more=""):

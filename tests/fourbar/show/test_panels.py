@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from fourbar.show.panels import LOWER, UPPER, Wanted, fit_panels
+from fourbar.show.panels import Wanted, fit_panels
 
 EDGES = np.linspace(0.0, 2.0, 6)
 
@@ -73,15 +73,6 @@ def test_the_largest_size_is_the_first_of_equal_ones(curve, peak, place):
 
 
 ZEROS = [0.3, 0.8, 1.7]
-
-
-def test_both_ends_of_a_range_are_found_and_the_way_back_begins_at_its_end():
-    for edges in (EDGES, EDGES[::-1]):
-        panels = fit(np.sin, edges)
-        assert panels.find_peak("curve", UPPER).place == approx(0.5 * pi, abs=1e-5)
-        assert panels.find_peak("curve", LOWER).value == approx(0.0, abs=1e-8)
-        level = fit(lambda x: 1.0 + 0.0 * x, edges)
-        assert level.find_peak("curve").place == approx(edges[0], abs=1e-8)
 
 
 @pytest.mark.parametrize("edges", (EDGES, np.array([0.0, 0.31, 2.0])))
