@@ -17,7 +17,7 @@ from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from tests.oracle.oracles import judge_by
 from tests.oracle.variants import SceneFile
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker
 from tests.support.shares import slow_but
 
 
@@ -33,10 +33,7 @@ def passing_change_points(lengths, branch):
 
 
 def commanding(motion):
-    ends = Place(1, (0.25, -2.8)), Place(2, (0.09, 0.17))
-    return crank_rocker(
-        motion=motion, drive=fourbar.LinearDrive(*ends), effects=(Gravity(),)
-    )
+    return crank_rocker(motion=motion, drive=CYLINDER, effects=(Gravity(),))
 
 
 def weigh_limited(angle):

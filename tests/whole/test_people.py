@@ -38,6 +38,17 @@ def ask(tmp_path, capsys, monkeypatch):
     return run
 
 
+@pytest.fixture
+def analyze(ask, tmp_path):
+    """Return what `analyze` prints of a text, as of a file."""
+
+    def run(text, *words):
+        (tmp_path / "scene.toml").write_text(text)
+        return ask("analyze", "scene.toml", *words)
+
+    return run
+
+
 def row_of(text, label, after=""):
     """Return the numbers of the first row with a label.
 
@@ -97,13 +108,13 @@ def assembled(text, branch):
     return text.replace("[points]", f'branch = "{branch}"\n[points]')
 
 
-def test_pliers_have_their_force_ratio_over_a_sweep(ask, tmp_path):
+def test_pliers_have_their_force_ratio_over_a_sweep(analyze):
     """At 49 deg it is the one of the position; by the speeds of both points."""
     sweep = 'theta_2 = { from = "49 deg", to = "55 deg", steps = 3 }'
     assert 'theta_2 = "49 deg"' in PLIERS
-    (tmp_path / "pliers.toml").write_text(PLIERS.replace('theta_2 = "49 deg"', sweep))
+    swept = PLIERS.replace('theta_2 = "49 deg"', sweep)
     names = "theta_2,F_jaw/F_handle,v_handle/v_jaw"
-    rows = list_columns(ask("analyze", "pliers.toml", "--columns", names))
+    rows = list_columns(analyze(swept, "--columns", names))
     assert rows[0][1] == pytest.approx(31.969, rel=PRINTED)
     assert all(forces == speeds for _, forces, speeds in rows)
 
@@ -124,19 +135,18 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(ask, tmp_path):
     )
 
 
-def test_a_linkage_by_the_coordinates_of_its_joints(ask, tmp_path):
+def test_a_linkage_by_the_coordinates_of_its_joints(analyze):
     """E stands where it is drawn, in the coordinates of the drawing, and its path goes
     through it.
     """
-    (tmp_path / "joints.toml").write_text(COORDINATES)
-    text = ask("analyze", "joints.toml", "--at", "drawn")
+    text = analyze(COORDINATES, "--at", "drawn")
     for name, place in {
         "A": (1.244, 0.196),
         "B": (-2.32, -2.293),
         "E": (-2.591, 1.657),
     }.items():
         assert row_of(text, name) == pytest.approx(place, rel=PRINTED)
-    scene = fourbar.load(tmp_path / "joints.toml")
+    scene = fourbar.files.loads(COORDINATES)
     curve = fourbar.coupler_curve(scene, "E", steps=4000)
     x, y = (np.asarray(z) + o for z, o in zip(curve[2:], scene.origin, strict=True))
     assert np.hypot(x + 0.02591, y - 0.01657).min() < 1e-4
@@ -188,10 +198,9 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 
 
 @pytest.mark.slow
-def test_a_given_couple_moves_two_parallel_links_from_rest(ask, tmp_path):
+def test_a_given_couple_moves_two_parallel_links_from_rest(analyze):
     """alpha = 14.8148 - 6.54 cos 30 deg; the upper link carries 2.139 kN."""
-    (tmp_path / "links.toml").write_text(COUPLE)
-    text = ask("analyze", "links.toml", "--at", "30 deg")
+    text = analyze(COUPLE, "--at", "30 deg")
     assert text.startswith("Parallelogram")
     right = [30.0, 2.9957, 14.8148148 - 6.54 * np.cos(np.radians(30.0))]
     assert row_of(text, "bar 2") == pytest.approx(right, rel=1e-4)
@@ -216,13 +225,12 @@ omega_2 = "20 rpm"
 """
 
 
-def test_steel_rods_by_their_density(ask, tmp_path):
+def test_steel_rods_by_their_density(analyze):
     """A file, two commands: torque, pins and stress.
 
     The shaking force position by position.
     """
-    (tmp_path / "rods.toml").write_text(RODS)
-    text = ask("analyze", "rods.toml")
+    text = analyze(RODS)
     peak, place, rms = row_of(text, "torque")
     assert (peak, rms) == pytest.approx((-3.04213, 1.01795), rel=2e-4)
     assert place == pytest.approx(2.517, abs=0.02)
@@ -233,7 +241,7 @@ def test_steel_rods_by_their_density(ask, tmp_path):
     )
     modulus = np.pi * 0.02**3 / 32.0
     assert 1e6 * stresses == pytest.approx(moments / modulus, rel=1e-3)
-    rows = list_columns(ask("analyze", "rods.toml", "--columns", "shaking_force"))
+    rows = list_columns(analyze(RODS, "--columns", "shaking_force"))
     assert max(rows)[0] == pytest.approx(12.7176, rel=1e-4)
 
 
@@ -394,11 +402,10 @@ gravity = ["1 g_0", "-90 deg"]
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_task_of_a_textbook_or_a_forum(task, ask, tmp_path):
+def test_a_task_of_a_textbook_or_a_forum(task, analyze):
     """A file, a command."""
     text, words, accuracy, rows = TASKS[task]
-    (tmp_path / "task.toml").write_text(text)
-    shown = ask("analyze", "task.toml", *words)
+    shown = analyze(text, *words)
     assert len(shown.splitlines()) < 40 or "homework" not in task
     for label, numbers in rows.items():
         printed = row_of(shown, label)
