@@ -811,6 +811,7 @@ theta_2,torque\n1,\n | needs a result in place of blank cells
 theta_2,torque\n1,2,3\n | needs 2 cells; with decimal commas, semicolons
 theta_2,torque\nrad,kg\n1,2\n | kg
 theta_2,torque_low\n1,2\n | no dry friction
+theta_2,drive_force\n1,2\n | its drive exerts a torque
 theta_2,wheel\n1,2\n | known are the columns of
 theta_2,torque [kg]\n1,2\n | kg
 theta_2,torque,torque\n1,2,3\n | columns 2 and 3 are both torque: rename
@@ -1062,6 +1063,7 @@ def with_comma(theta, torque):
         ("Kurbelwinkel [deg];Drehmoment [N m]", with_comma),
         ("THETA_2 [deg],TORQUE",),
         ("theta2 (deg),T2 (N m)",),
+        ("θ\N{SUBSCRIPT TWO} / deg,T\N{SUBSCRIPT TWO} / N m",),
         ("Theta_2 [DEG],Torque [N M]",),
         ("Crank angle (deg)\tMotor torque (N-m)", "{theta:.0f}\t{torque:.9e}"),
         ("theta2 [deg],T [N·m]",),

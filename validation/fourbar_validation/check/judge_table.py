@@ -129,7 +129,11 @@ class JudgedColumn:
             rate = f"motion.{solution.at.names[1]}"
             needed = f"is needed in the scene or the table to judge {self.key}"
             raise InputError(rate, None, needed)
-        missing = "does not exist in this scene: it has no dry friction"
+        exerts = "torque" if self.judge.drive is COUPLE else "force"
+        why = f"its drive exerts a {exerts}"
+        if self.quantity in self.judge.drive:
+            why = "it has no dry friction"
+        missing = f"does not exist in this scene: {why}"
         raise InputError("header", self.key, missing)
 
     def predict(self, predict: Predict) -> Array | None:

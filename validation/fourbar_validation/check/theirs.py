@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import NamedTuple
+from unicodedata import normalize
 
 import numpy as np
 
@@ -121,11 +122,11 @@ LARGEST_TABLE_FILE = 64 * 2**20
 """Bytes; a table larger than this is not a hand-made comparison."""
 _HEADING = re.compile(
     r"\|?(?P<name>\w[\w /]*?)\|?\s*"
-    r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))?"
+    r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\)|/ (?P<slash>.*))?"
     r"(?P<letter>_[xy])?"
 )
-"""Heading of a column: a name, its unit in brackets, and a component. The name may
-stand between bars.
+"""Heading of a column: a name, its unit in brackets or after a slash, and a component.
+The name may stand between bars.
 """
 
 
@@ -483,7 +484,8 @@ def _is_known(name: str, points: Collection[str]) -> bool:
 
 def _spell(name: str) -> str:
     """Spell a name in small letters, without spaces, hyphens and underscores."""
-    plain = name.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
+    plain = normalize("NFKC", name)  # of a digit below the line
+    plain = plain.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
     return re.sub(r"[\s_-]", "", plain.lower())
 
 
@@ -514,7 +516,8 @@ def _read_heading(
     plain = heading.strip()
     match = _HEADING.fullmatch(plain)
     if match:
-        unit = (match["square"] or match["round"] or unit).strip()
+        stated = match["square"] or match["round"] or match["slash"]
+        unit = (stated or unit).strip()
         plain = match["name"] + (match["letter"] or "")
     name = _REACTIONS.get(plain[:3], plain[:3]) + plain[3:]
     if not _is_known(name, points) and name not in NOT_JUDGED:
