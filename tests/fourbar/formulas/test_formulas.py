@@ -19,7 +19,6 @@ from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     PARALLELOGRAM,
     bare,
-    draw_linkage,
 )
 
 QUADRUPLES = int(os.environ.get("DRAWINGS", "300"))
@@ -145,19 +144,6 @@ def five(bars, psi):
         (b + c) ** 2 - e**2,
         e**2 - (b - c) ** 2,
     ]
-
-
-@pytest.mark.parametrize("offset", [None, "1e-25"])
-def test_the_half_angle_in_many_digits_is_rounded_once(offset):
-    rng = np.random.default_rng(41)
-    with mp.workdps(200):
-        for _ in range(60):
-            bars, theta_2 = draw_linkage(rng), float(rng.uniform(-3.0, 3.0))
-            beyond = None if offset is None else mp.mpf(offset) * theta_2
-            psi = mp.mpf(theta_2) + (beyond or 0) - mp.mpf(bars.ground_angle)
-            half = exact_half_angle(bars, theta_2, beyond)
-            for ours, exact in zip(half[:5], five(bars, psi), strict=True):
-                assert abs(ours - exact) <= U * abs(exact)
 
 
 @pytest.mark.slow
