@@ -108,9 +108,8 @@ class Piece(BodyWrenches):
     def __post_init__(self):
         n = len(self.motion.theta_2)
         super().__init__(n)
-        self.N, self.V, self.M = np.zeros(n), np.zeros(n), np.zeros(n)
-        self.pushing, self.turning = np.zeros(n), np.zeros(n)
-        """Sums of the absolute terms of the whole bar, N and N m."""
+        self.N, self.V, self.M, self.pushing, self.turning = np.zeros((5, n))
+        """The last two: sums of the absolute terms of the whole bar, N and N m."""
 
     def push(self, bar, force, arm):
         """Add a force, world axes, at an arm from the bar's first pin, on the piece

@@ -40,17 +40,17 @@ class _FileBody(NamedTuple):
 class Contents(NamedTuple):
     """Statements of a file on a linkage."""
 
-    bodies: dict[str, _FileBody]
-    pins: dict[str, complex]
+    bodies: dict
+    pins: dict
     """Places of the pins in the world; NaN if the two bars of a pin do not meet."""
-    turns: list[dict[str, float]]
+    turns: list
     """Statements of the angles of all bars, rad. They are by the bodies, by the joints,
     and in words.
     """
     gravity: complex
-    damping: dict[str, float]
+    damping: dict
     """Damping by pin, as the next field."""
-    friction: dict[str, float]
+    friction: dict
 
 
 def sdf(question):

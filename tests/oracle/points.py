@@ -1,9 +1,6 @@
 """A scene's own points, moved as the angles of another derivation have them."""
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK
@@ -62,17 +59,12 @@ def compare_points(question, scene, solution, reference, least=0.0):
     return question.row("points", error, allowed, what, usable, theta_2=theta_2)
 
 
-class PointMotion(NamedTuple):
-    """Motion of a point over the positions, as x + i y: place, velocity and
-    acceleration of the bar's first pin, from O2, and of the point against that pin.
-    """
-
-    arms: list[NDArray[np.complex128]]
-    feet: list[NDArray[np.complex128]]
-
-
 def move_points(scene, reference):
-    """Move a scene's own points as the angles of another derivation have them."""
+    """Move a scene's own points as the angles of another derivation have them.
+
+    Return by name, over the positions and as x + i y, place, velocity and acceleration
+    of the point against its bar's first pin, and those of that pin, from O2.
+    """
     link = scene.linkage
     zero = np.zeros(len(reference))
     theta, speed, growth = {1: zero + link.ground_angle}, {1: zero}, {1: zero}
@@ -92,6 +84,5 @@ def move_points(scene, reference):
     moved = {}
     for point in state_from_pins(scene).points:
         arms = swing(point.bar, *point.place.polar_from_pin())
-        feet = first_pins.get(point.bar, [zero, zero, zero])
-        moved[point.name] = PointMotion(arms, feet)
+        moved[point.name] = arms, first_pins.get(point.bar, [zero, zero, zero])
     return moved

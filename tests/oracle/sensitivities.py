@@ -207,8 +207,7 @@ def _place_points(scene, answer, drawing):
     origin = complex(*drawing.O2) if drawing else 0j
     placed = {}
     for name, moved in move_points(scene, make_reference(scene, answer)).items():
-        shifts = (origin, 0j, 0j)
-        parts = zip(POINT_STAGES, moved.arms, moved.feet, shifts, strict=True)
+        parts = zip(POINT_STAGES, *moved, (origin, 0j, 0j), strict=True)
         for start, arm, foot, shift in parts:
             vector = arm + foot + shift
             placed[f"{start}{name}"] = np.stack((vector.real, vector.imag), axis=1)

@@ -76,7 +76,7 @@ class _SummaryJudge:
 
     question: Question
     facts: Facts
-    errors: dict[str, list[float]] = field(default_factory=dict)
+    errors: dict = field(default_factory=dict)
     """Errors in parts of the value, by the name of the row."""
 
     @property
@@ -315,7 +315,7 @@ class _Panels(NamedTuple):
     """Curves of the free bodies at the Gauss nodes of panels that follow each other."""
 
     width: Array
-    curves: dict[str, Array]
+    curves: dict
     """(panels, nodes, components)."""
 
     def find_rms(self, name):
