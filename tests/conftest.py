@@ -8,8 +8,6 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -39,7 +37,7 @@ FLAGS = (
 HERE = {"posix": hasattr(os, "fork"), "linux": sys.platform == "linux"}
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     for item in items:
         for system in (
             name
@@ -50,7 +48,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_collection() -> Iterator[None]:
+def pytest_collection():
     """Modules and tests are kept to the end: looking for garbage among them takes a
     sixth of the time in which they are loaded.
     """
@@ -62,7 +60,7 @@ def pytest_collection() -> Iterator[None]:
 
 
 @pytest.fixture
-def interruptible() -> Iterator[None]:
+def interruptible():
     """Programs started here heed SIGINT.
 
     A job in the background ignores it, and what is ignored would be inherited.
@@ -73,7 +71,7 @@ def interruptible() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
+def chromium(tmp_path_factory):
     """One browser for all tests of pages; each test opens its own page in it."""
     if CHROMIUM is None or DRIVER is None:
         pytest.skip(
@@ -93,19 +91,13 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
 
 
 @pytest.fixture
-def browse(chromium, tmp_path: Path):
+def browse(chromium, tmp_path):
     """Opens page text at a width, light or dark.
 
     After the test the console must be empty.
     """
 
-    def open_page(
-        text: str,
-        width: int = 1100,
-        *,
-        dark: bool = False,
-        still: bool = False,
-    ):
+    def open_page(text, width=1100, *, dark=False, still=False):
         path = tmp_path / "page.html"
         path.write_text(text, encoding="utf-8")
         metrics = {

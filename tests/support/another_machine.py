@@ -24,7 +24,7 @@ class Core(NamedTuple):
 
     needs: str
     """The feature without which its instructions are illegal."""
-    lacks: tuple[str, ...]
+    lacks: tuple
     """Beginnings of NumPy's names for what such a CPU has not; "" is all of them."""
     tunables: str = ""
     """The same for the sine of the GNU C library."""

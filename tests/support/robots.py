@@ -28,7 +28,6 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import judge_file, list_answers
 
-Point = tuple[float, float]
 FOOT, GRIPPER = (
     (MODELS / "robots" / f"{name}.xml").read_text()
     for name in ("biped_foot", "gripper")
@@ -331,7 +330,7 @@ def answer_of(examined, how):
 class Planar:
     """A four-bar in the pose of its pins, and how the tree of its bodies is cut."""
 
-    pins: dict[str, Point] = field(
+    pins: dict = field(
         default_factory=lambda: {
             "O2": (0.0, 0.0),
             "A": (0.03, 0.08),
@@ -351,7 +350,7 @@ class Planar:
     """Further elements of the ground's body."""
     on_coupler: str = ""
     """Further elements of the coupler's body."""
-    axes: dict[str, str] = field(default_factory=dict)
+    axes: dict = field(default_factory=dict)
     """Axis of a pin where it is not z."""
     drive: str = "O2"
     more: str = ""

@@ -129,7 +129,9 @@ class Loop:
         mujoco.mj_forward(self.model, self.data)
         data = self.data
         angles, speeds, accelerations = (
-            _add_crank(joints) for joints in (data.qpos, data.qvel, data.qacc)
+            # the coupler's joint turns on the crank
+            np.array([joints[0], joints[0] + joints[1], joints[2]])
+            for joints in (data.qpos, data.qvel, data.qacc)
         )
         forces = self.balance(angles, speeds, accelerations)
         forces["torque"] = [-self.settings.wheel * accelerations[0]]
@@ -166,10 +168,3 @@ def measure(scene, settings):
         apart, size = (np.linalg.norm(one, axis=1) for one in (ours - exact, exact))
         errors[name] = apart.max() / size.max()
     return errors
-
-
-def _add_crank(joints):
-    """Return angles, speeds or accelerations of the bars: the coupler's joint turns
-    on the crank.
-    """
-    return np.array([joints[0], joints[0] + joints[1], joints[2]])

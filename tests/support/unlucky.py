@@ -18,7 +18,7 @@ from tests.support.scenes import crank_rocker
 class Few(Suite):
     """Scenes made in code; the names say which engine misbehaves where."""
 
-    names: tuple[str, ...] = ("a", "b", "c", "d")
+    names: tuple = ("a", "b", "c", "d")
 
     def __len__(self):
         return len(self.names)

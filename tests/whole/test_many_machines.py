@@ -58,14 +58,6 @@ def run_shell(script, folder, options=(), **variables):
     )
 
 
-def collect_as_shown(folder):
-    """Run the command that the page shows for collecting."""
-    line = "fourbar-validation collect parts/* --out results"
-    assert line in read("docs/many-machines.md")
-    run_shell(line, folder)
-    return folder / "results"
-
-
 def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     """One task is killed in the middle, and submitted again."""
 
@@ -78,7 +70,10 @@ def test_a_slurm_array_changes_no_byte(alone, tmp_path):
     submit("2", "2")
     (tmp_path / "parts" / "2" / "parts" / "000001").unlink()
     submit("2", "1", PARTS="2")
-    assert_same_bytes(collect_as_shown(tmp_path), alone)
+    line = "fourbar-validation collect parts/* --out results"
+    assert line in read("docs/many-machines.md")
+    run_shell(line, tmp_path)
+    assert_same_bytes(tmp_path / "results", alone)
 
 
 @contextmanager

@@ -172,13 +172,6 @@ def built(folder):
     return next(dist.glob("*.whl")), next(dist.glob("*.tar.gz"))
 
 
-def lowest(requirements):
-    """The lowest versions that are declared: the constraints of an installation."""
-    return [
-        re.sub(r">=([0-9.]+).*", r"==\1.*", requirement) for requirement in requirements
-    ]
-
-
 def installed_works(python, package, folder, constraints):
     """Install afresh, outside the tree.
 
@@ -248,9 +241,8 @@ def test_wheel_and_archive_install_on_every_python(tmp_path):
     for version, python in pythons.items():
         if python and run_line([python, "--version"]).returncode == 0:
             installed_works(python, wheel, tmp_path / version, [])
-    installed_works(
-        sys.executable,
-        archive,
-        tmp_path / "lowest",
-        lowest(PROJECT["project"]["dependencies"]),
-    )
+    lowest = [
+        re.sub(r">=([0-9.]+).*", r"==\1.*", requirement)
+        for requirement in PROJECT["project"]["dependencies"]
+    ]
+    installed_works(sys.executable, archive, tmp_path / "lowest", lowest)
