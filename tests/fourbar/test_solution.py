@@ -17,7 +17,7 @@ from tests.support.scenes import crank_rocker
 
 
 def pointed():
-    return replace(crank_rocker(), points=(Point("P", 3, (0.1, 0.2)),))
+    return crank_rocker(points=(Point("P", 3, (0.1, 0.2)),))
 
 
 def test_a_quantity_is_found_by_its_name():

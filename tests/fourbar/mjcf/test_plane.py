@@ -19,10 +19,7 @@ from tests.support.rows import read_rows
 
 AXES = [(0.3, 0.0, 1.0), (-2.0, 5.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -3.0)]
 ORIGIN = (1.0, -2.0, 0.5)
-
-
-def scene():
-    return load(MODELS / "crank_rocker.toml")
+SCENE = load(MODELS / "crank_rocker.toml")
 
 
 @pytest.mark.parametrize("axis", AXES)
@@ -75,7 +72,7 @@ def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
     plane = Plane(axis, ORIGIN)
     answers = []
     for place in (Plane(), plane):
-        model, data = open_model(write_mjcf(scene(), plane=place))
+        model, data = open_model(write_mjcf(SCENE, plane=place))
         mujoco.mj_step(model, data, 50)
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
@@ -101,8 +98,8 @@ def test_only_a_plane_that_is_tilted_is_called_so():
         ("tilted", Plane((0.3, 0.0, 1.0), ORIGIN)),
     ):
         texts[name] = [
-            assembly.write_sdf(scene(), without_loads=True, plane=plane),
-            write_mjcf(scene(), plane=plane),
+            assembly.write_sdf(SCENE, without_loads=True, plane=plane),
+            write_mjcf(SCENE, plane=plane),
         ]
     for name, written in texts.items():
         for text in written:
@@ -114,7 +111,7 @@ def test_only_a_plane_that_is_tilted_is_called_so():
 @pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
 def test_the_joints_of_a_usd_meet_wherever_the_plane_is(axis):
     plane = Plane(axis, ORIGIN)
-    text = assembly.write_usd(scene(), without_loads=True, plane=plane)
+    text = assembly.write_usd(SCENE, without_loads=True, plane=plane)
 
     def read(name, block):
         found = re.search(rf"{name} = \(([^)]*)\)", block)

@@ -204,10 +204,10 @@ def check_loads(facts, sizes, weights):
     entry = list_duty(facts.solution, {})
     for pin, force in PIN_FORCE.items():
         peak = panels.find_peak(force)
-        rms = sqrt(weights @ sizes[force] ** 2)
-        assert motion.find_rms(force) == approx(rms, rel=EXACT, abs=1e-12)
-        theta_2 = motion.find_theta_2(peak.place)
         rms = motion.find_rms(force)
+        right = sqrt(weights @ sizes[force] ** 2)
+        assert rms == approx(right, rel=EXACT, abs=1e-12)
+        theta_2 = motion.find_theta_2(peak.place)
         of_pin = {"peak": peak.value, "rms": rms, "theta_2": theta_2}
         assert of_pin.items() <= entry["pins"][pin].items()
     drive, *_ = sizes

@@ -120,13 +120,14 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
 
 
-KITE = (0.3, 0.1, 0.1, 0.3)
-
-
 @pytest.mark.parametrize("branch", [1, -1])
 @pytest.mark.parametrize(
     "lengths, command",
-    [(PARALLELOGRAM, "theta_2"), (PARALLELOGRAM, "theta_4"), (KITE, "theta_2")],
+    [
+        (PARALLELOGRAM, "theta_2"),
+        (PARALLELOGRAM, "theta_4"),
+        ((0.3, 0.1, 0.1, 0.3), "theta_2"),
+    ],
 )
 def test_derivatives_are_the_differences_of_a_study_at_change_points(
     lengths, branch, command
