@@ -25,7 +25,16 @@ from fourbar.files import dump
 from fourbar.files.scene_text import MOVING_BAR_NUMBERS
 from fourbar.formulas.mobility import classify
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import ANGLES, DERIVED_NAMES, OK, PIN_FORCES, RATES, Array
+from fourbar.quantities import (
+    ANGLES,
+    COUPLE,
+    DERIVED_NAMES,
+    LINE,
+    OK,
+    PIN_FORCES,
+    RATES,
+    Array,
+)
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
@@ -56,7 +65,7 @@ _WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
 CENTRES = ("I13", "I24")
 """Places that lie at infinity now and then: a figure has them, no curve."""
-DRIVE_SCALARS = ("torque", "torque_error", "power", "drive_force", "drive_force_error")
+DRIVE_SCALARS = (*COUPLE, "power", *LINE)
 """Numbers of a drive, which a released motion has not."""
 ANIMATED_SCALARS = (*ANGLES, "condition", *RATES, *DRIVE_SCALARS, "stroke")
 

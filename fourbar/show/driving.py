@@ -53,16 +53,24 @@ def read_drive_demand(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
+def leaves_range(solution: Solution) -> Any:
+    """Return where dry friction at rest leaves the drive a range, (n,).
+
+    Torque or force of the drive and the pin forces are without that friction there.
+    """
+    low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
+    if low is None:
+        return np.zeros(len(solution), dtype=bool)
+    return np.isfinite(high - low) & (low < high)
+
+
 def find_held(solution: Solution) -> tuple[Any, Array]:
     """Return the rows in which dry friction holds a pin, (k,), and senses of starts.
 
     A position at rest with an acceleration starts to move, and nothing is held there:
     its sense is that of the acceleration, 1 or -1. Elsewhere it is 0, (n,).
     """
-    low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
-    if low is None:
-        return [], np.zeros(0)
-    held = np.isfinite(high - low) & (low < high)
+    held = leaves_range(solution)
     at_rest = held & (solution.at.speed == 0.0)
     senses = at_rest * np.sign(solution.at.acceleration)
     return np.flatnonzero(held & (senses == 0.0)), senses

@@ -9,6 +9,7 @@ import fourbar
 from fourbar import (
     Bar,
     FourBar,
+    Friction,
     Gravity,
     LinearDrive,
     Load,
@@ -48,6 +49,13 @@ def crank_rocker(**changes):
         "title": "crank-rocker",
     }
     return Scene(**{**parts, **changes})
+
+
+RESTING = crank_rocker(
+    motion=Motion(math.radians(40.0), 0.0),
+    effects=(Gravity(), Friction((("O2", 0.2),))),
+)
+"""Held by the drive and by dry friction, whose couple at O2 is up to 0.2 N m."""
 
 
 def find_angle(side, first, second):

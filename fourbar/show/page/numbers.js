@@ -60,6 +60,13 @@ const nameOf = si => (data.units[si]?.[0] ?? si).replace("^2", "\u00b2");
 
 const valuesAt = i => ({ ...Object.fromEntries(Object.entries(table()).map(([name, column]) => [name, column[i]])), theta_2: grid[i] });
 
+// A number at a position, written; of the drive where dry friction at rest leaves it a range, that range.
+const leavesRange = v => v.torque_low < v.torque_high || v.drive_force_low < v.drive_force_high;
+function ranged(v, name, write) {
+  const [low, high] = [v[`${name}_low`], v[`${name}_high`]];
+  return low < high ? `${write(low)} to ${write(high)}` : write(v[name]);
+}
+
 // Velocity and acceleration of a point: [name, its bar, from the bar's first pin in the bar's frame].
 const pointsOf = () => [["A", 2, () => [lengths[1], 0]], ["B", 4, () => [lengths[3], 0]],
   ...[2, 3, 4].filter(k => data.centres[k]).map(k => [`G${k}`, k, () => data.centres[k]]),
@@ -93,8 +100,8 @@ function showNumbers(i) {
   byId("condition").textContent = text(v.condition);
   const across = v.theta_3 === undefined || v.theta_3 === null ? null : Math.atan2(Math.abs(Math.sin(v.theta_4 - v.theta_3)), Math.abs(Math.cos(v.theta_4 - v.theta_3)));
   byId("mu").textContent = degrees(across);
-  byId("torque").textContent = text(inUnit("N m", v.torque));
-  byId("drive_force").textContent = text(inUnit("N", v.drive_force));
+  byId("torque").textContent = ranged(v, "torque", value => text(inUnit("N m", value)));
+  byId("drive_force").textContent = ranged(v, "drive_force", value => text(inUnit("N", value)));
   byId("stroke").textContent = text(v.stroke * unit.factor);
   byId("torque-error").textContent = Number.isFinite(v.torque_error) ? `give or take ${text(inUnit("N m", v.torque_error), 2)}` : "";
   byId("energy").textContent = text(inUnit("J", v.energy));
@@ -109,7 +116,7 @@ function showNumbers(i) {
   }
   const assembled = at(i) !== null, singular = v.status === "singular";
   const status = byId("status");
-  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? single() && !timed() ? "What is commanded decides no velocities here: they have no value." : "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || "";
+  status.textContent = !assembled ? "The linkage does not assemble at this position." : singular ? single() && !timed() ? "What is commanded decides no velocities here: they have no value." : "Coupler and output are in line: velocities have no value here." : REASONS[v.status] || (leavesRange(v) ? "At rest dry friction leaves the drive the range shown; pin forces and curves take it as 0." : "");
   status.hidden = status.textContent === "";
   byId("theta").value = i;
   const over = axis(), written = fixed(over.values[i] * over.factor, timed() ? clock : 2), spoken = { " s": " seconds", "\u00b0": " degrees" }[over.sign] ?? over.sign;
@@ -119,7 +126,7 @@ function showNumbers(i) {
   if (!playing) {
     let words = assembled ? `Theta 2 ${here}, theta 3 ${degrees(v.theta_3)}, theta 4 ${degrees(v.theta_4)} degrees` : grid[i] === null ? "does not assemble" : `Theta 2 ${here}: does not assemble`;
     if (over.name !== "theta_2") words = `${over.name === "time" ? "At" : AXES[over.name].join(" ")} ${written}${spoken}: ` + words;
-    if (v.torque !== undefined && v.torque !== null) words += `, torque ${text(inUnit("N m", v.torque), 4)} ${nameOf("N m")}`;
+    if (v.torque !== undefined && v.torque !== null) words += `, torque ${ranged(v, "torque", value => text(inUnit("N m", value), 4))} ${nameOf("N m")}`;
     byId("live").textContent = words;
     byId("picture-text").textContent = `Four-bar linkage, ${branch === 1 ? "open" : "crossed"} branch. ${words}`;
   }

@@ -111,10 +111,8 @@ function refresh() {
   byId("axis").textContent = `${what} ${symbol}`;
   byId("over").textContent = timed() ? "Over time" : `Over ${symbol}`;
   byId("sine").textContent = SINES[data.over.commanded];
-  for (const element of document.querySelectorAll(".driven")) element.hidden = !shows("torque");
-  for (const element of document.querySelectorAll(".pushed")) element.hidden = !shows("drive_force");
-  for (const element of document.querySelectorAll(".erring")) element.hidden = !shows("torque_error");
-  for (const element of document.querySelectorAll(".energy")) element.hidden = !shows("energy");
+  const needed = { driven: "torque", pushed: "drive_force", stroked: "stroke", erring: "torque_error", energy: "energy" };
+  for (const [kind, name] of Object.entries(needed)) for (const element of document.querySelectorAll(`.${kind}`)) element.hidden = !shows(name);
   for (const element of document.querySelectorAll(".dynamic")) element.hidden = !dynamic();
   byId("show-forces").disabled = byId("arrow-scale").disabled = !dynamic();
   fit();

@@ -318,6 +318,14 @@ def list_transmission(view: View) -> Chart:
 _FORCE_LOOKS: Looks = {
     write_force_name(name): (name, choose_force_line(name)) for name in FORCE_COLOURS
 }
+
+
+def list_pin_forces(view: View) -> Chart:
+    """List the sizes of the pin forces."""
+    view.note_rest(view.sweep)
+    return make_chart("Pin forces", "$|F|$", _FORCE_LOOKS, view, zero="end")
+
+
 _SHAKING_LOOKS: Looks = {
     "$|F|$": ("shaking_force", {"color": INK}),
     "$F_x$": ("shaking_force_x", {"color": BAR_COLOURS[2], "ls": (0, (4, 1.5))}),
@@ -342,7 +350,7 @@ CHARTS: dict[str, Callable[[View], Chart]] = {
     "stroke": partial(
         make_chart, "Stroke of the drive", "stroke", _STROKE_LOOKS, zero=""
     ),
-    "forces": partial(make_chart, "Pin forces", "$|F|$", _FORCE_LOOKS, zero="end"),
+    "forces": list_pin_forces,
     "mu": list_transmission,
     "shaking force": partial(
         make_chart, "Shaking force on the frame", "$F$", _SHAKING_LOOKS

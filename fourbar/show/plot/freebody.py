@@ -183,6 +183,7 @@ def draw_free_bodies(figure: "SubFigure", view: View) -> None:
     longest = max(view.scene.linkage.lengths[1:])
     scale = 0.75 * longest / biggest if biggest else 0.0
     view.note(f"At {view.at}.")
+    view.note_rest(view.here)
     panels = figure.subplots(1, 3)
     for axes, bar in zip(panels, freed, strict=True):
         _draw_one(axes, view, bar, scale, biggest)
@@ -219,6 +220,7 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     panels = figure.subplots(3, 3, sharex="col")
     solution = view.here if view.stated else view.sweep
     _require_forces(solution, "bars")
+    view.note_rest(solution)
     bending = Facts(solution).bending
     for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)

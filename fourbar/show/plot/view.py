@@ -20,7 +20,8 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
-from fourbar.show.plot.style import join_points
+from fourbar.show.driving import leaves_range, read_drive_demand
+from fourbar.show.plot.style import join_points, write_labelled_quantity
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
@@ -192,6 +193,20 @@ class View:
         text = _BINDING.sub("\u00a0", text)
         if text not in self.notes:
             self.notes.append(text)
+
+    def note_rest(self, solution: Solution) -> None:
+        """Say where dry friction at rest is left out; at one position, its range."""
+        if not leaves_range(solution).any():
+            return
+        text = "Dry friction at rest is taken as 0"
+        if len(solution) == 1:
+            drive = read_drive_demand(solution)
+            ends = [float(solution[end][0]) for end in drive.keys[2:]]
+            low, high = (
+                write_labelled_quantity(end, drive.unit, self.units) for end in ends
+            )
+            text += f"; with it the {drive.name} is between {low} and {high}"
+        self.note(f"{text}.")
 
     def state(self) -> State:
         """Return the kinematics at the position drawn."""

@@ -16,6 +16,7 @@ pytest.importorskip(
 from fourbar.edit.exports import evaluate_scene
 from fourbar_validation.places import MODELS
 from tests.support.block import read_block
+from tests.support.scenes import RESTING
 from tests.support.shares import slow_but
 
 BOUNDED = (
@@ -48,6 +49,11 @@ def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     assert re.search(rf"(torque|force) +peak -?{re.escape(peak)} at", block), drive
     load = re.fullmatch(r"largest pin force (\S+ \S+) at \w\d?", pins)
     assert load[1] in block, pins
+
+
+def test_the_headline_says_that_dry_friction_at_rest_is_left_out():
+    headline = evaluate_scene(RESTING, COMMON)["headline"]
+    assert "; dry friction at rest taken as 0; " in headline
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from fourbar.show.duty import compute_energies
 from fourbar.show.tolerances import PAGE_SAMPLES
 from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_animate import HOSTILE, PNG, RELEASED
-from tests.support.scenes import CYLINDER, crank_rocker, thesis
+from tests.support.scenes import CYLINDER, RESTING, crank_rocker, thesis
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
@@ -517,6 +517,14 @@ def test_positions_alone_show_no_dynamics(show):
     assert page["omega_3"].text == "–"
     page["forward"].click()
     assert page.numbers("theta_2") == approx([10.0], abs=PRINTED_DEG)
+
+
+def test_the_drive_at_rest_has_the_range_that_dry_friction_leaves_it(show):
+    page = show(RESTING)
+    torque = solve(RESTING).torque[0]
+    ends = [number(end) for end in page["torque"].text.split(" to ")]
+    assert ends == approx([torque - 0.2, torque + 0.2], rel=PRINTED)
+    assert page["status"].text.startswith("At rest dry friction leaves")
 
 
 def test_it_says_why_a_position_has_no_forces(show):

@@ -47,6 +47,7 @@ from tests.support.rows import read_rows
 from tests.support.scenes import (
     CYLINDER,
     PARALLELOGRAM,
+    RESTING,
     crank_rocker,
     recommand,
     thesis,
@@ -353,6 +354,16 @@ def test_free_bodies_balance(drive):
         at_pins = ("viscous", "friction", "pin friction", "torsion")
         named = [text for text in texts if text.startswith(at_pins)]
         assert named and all(" at $" in text for text in named)
+
+
+@pytest.mark.parametrize("name", ["freebody", "bars", "forces"])
+def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
+    caption = draw_figure(RESTING, name).figure.subfigs[0].get_supxlabel()
+    words = " ".join(caption.split())
+    assert "Dry friction at rest is taken as 0" in words
+    torque = 1e3 * solve(RESTING).torque[0]
+    ends = f"between {torque - 200.0:.3g} mN m and {torque + 200.0:.3g} mN m"
+    assert (ends in words) == (name != "forces"), words
 
 
 @pytest.mark.parametrize(
