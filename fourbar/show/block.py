@@ -664,7 +664,11 @@ class SceneBlock(Facts):
         ):
             force = sense * panels.find_peak(LINE.value, rank).value
             if (ends := getattr(solution, end)) is not None:
-                force = max(force, np.nanmax(sense * ends))
+                starts = self.motion.starts
+                ends = sense * np.where(np.isnan(starts), ends, starts)
+                # values at rest leave out the friction that a start works against
+                force = 0.0 if self.motion.start else force
+                force = max(force, np.nanmax(ends))
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(

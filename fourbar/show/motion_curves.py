@@ -139,12 +139,15 @@ class MotionCurves:
     def from_rest(self) -> dict[str, float]:
         """Largest pin forces and bending moments as the linkage begins to move.
 
-        Both directions count, each against the whole of dry friction.
+        Both directions count, each against the whole of dry friction, unless an
+        acceleration says which.
         """
-        at = self.solve_between().at
+        solution = self.solve_between()
+        _, senses = find_held(solution)
         largest = dict[str, float]()
-        for speed in (_BEGINNING, -_BEGINNING):
-            begun = solve(self.scene, at=at._replace(speed=speed))
+        for sense in (1.0, -1.0):
+            speed = _BEGINNING * np.where(senses == 0.0, sense, senses)
+            begun = solve(self.scene, at=solution.at._replace(speed=speed))
             loads = compute_pin_loads(begun)
             for bar, bending in compute_bending(begun).items():
                 loads[f"bending_{bar}"] = np.abs(bending.moment)
@@ -154,25 +157,34 @@ class MotionCurves:
         return largest
 
     @cached_property
+    def starts(self) -> Array:
+        """Torque or force of the drive that starts each position of `solve_between`.
+
+        It has the stated acceleration, against dry friction; NaN where nothing starts.
+        """
+        solution = self.solve_between()
+        _, senses = find_held(solution)
+        starts = np.full(len(solution), np.nan)
+        if (rows := np.flatnonzero(senses)).size:
+            at = solution.at.part(rows)._replace(speed=_BEGINNING * senses[rows])
+            name = read_drive_demand(solution).keys.value
+            starts[rows] = solve(self.scene, at=at)[name]
+        return starts
+
+    @cached_property
     def start(self) -> Peak | None:
         """Largest torque or force of the drive that starts a motion from rest.
 
-        It has the stated acceleration, against dry friction. Along a law it is a limit
-        of what stands between the positions, and None here.
+        Along a law it is a limit of what stands between the positions, and None here.
         """
         if self.panels.located and (
             self.scene.motion.law or np.any(self.solution.at.speed)
         ):
             return None
-        solution = self.solve_between()
-        _, senses = find_held(solution)
-        if not senses.any():
-            return None
-        at = solution.at._replace(speed=_BEGINNING * senses)
-        begun = solve(self.scene, at=at)[read_drive_demand(solution).keys.value]
-        values = np.where(senses == 0.0, 0.0, begun)
-        row = int(np.nanargmax(np.abs(values)))
-        return Peak(float(values[row]), float(at.places[row]))
+        sizes = np.nan_to_num(np.abs(self.starts))
+        row = int(np.argmax(sizes))
+        place = float(self.solve_between().at.places[row])
+        return Peak(float(self.starts[row]), place) if sizes[row] else None
 
     @property
     def is_steady(self) -> bool:

@@ -36,6 +36,8 @@ _INSET = 1e-9
 """Part of a range that is left out at its limit positions. These may not assemble as
 doubles.
 """
+_BESIDE = 1e-6
+"""Part of the motion from a change point to where a bending moment is read."""
 _STEPS_OF_RANGE = 48
 ZERO_TRANSMISSION_ANGLE = 1e-6
 """Transmission angle that counts as zero, rad. At a limit, a place in its last digits
@@ -165,8 +167,10 @@ class Facts:
         solution = self.solution
         if abs(solution.sin_mu[0]) <= ZERO_TRANSMISSION_ANGLE:
             return Peak(0.0, float(solution.at.places[0]))
-        if panels.located and len(zeros := panels.find_zeros("sin_mu")):
-            return Peak(0.0, float(zeros[0]))
+        # a released motion states those of its change points alone
+        zeros = panels.find_zeros("sin_mu") if panels.located else ()
+        if passed := [*zeros, *(solution.change_points or ())]:
+            return Peak(0.0, float(passed[0]))
         # between two stretches it may change its sign without a zero
         least = panels.find_peak("sin_mu", lambda sines: -np.abs(sines))
         mu = math.asin(min(1.0, abs(least.value)))
@@ -183,7 +187,10 @@ class Facts:
         for bar, peak in peaks.items():
             solution = self.solution
             if motion.panels.located and peak is not None:
-                solution = motion.solve_at(np.array([peak.place]))
+                # on a change point there are no forces, which it has beside it
+                away = _BESIDE * motion.panels.length * np.array([0.0, -1.0, 1.0])
+                places = np.clip(peak.place + away, min(self.ends), max(self.ends))
+                solution = motion.solve_at(places)
                 bending = compute_bending(solution)[bar]
             else:
                 bending = self._bending_at_positions[bar]

@@ -8,6 +8,7 @@ from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import Number
 from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
+from fourbar.quantities import PIN_FORCES
 from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.linkage_figure import (
     draw_bar,
@@ -221,8 +222,8 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     solution = view.here if view.stated else view.sweep
     _require_forces(solution, "bars")
     view.note_rest(solution)
-    bending = Facts(solution).bending
-    for column, (bar, worst) in zip(panels.T, bending.items(), strict=True):
+    facts = Facts(solution)
+    for column, (bar, worst) in zip(panels.T, facts.bending.items(), strict=True):
         x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
@@ -250,6 +251,11 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     view.note(
         "x runs along the line between the pins, y to its left; N > 0 is tension.",
     )
+    if not facts.motion.panels.growing.isdisjoint(PIN_FORCES):
+        view.note(
+            "Pin forces grow without bound: N beside such a place is a matter of how"
+            " near it is."
+        )
 
 
 def _draw_one(

@@ -545,13 +545,21 @@ SPIKE = Load(2, moment=-1.0, table=Table(CORNERS, (1.0, 1.0, 50.0, 1.0, 1.0)))
 """A couple on the crank that is largest between two positions."""
 
 
-def test_a_bore_at_rest_moves_the_linkage_against_its_friction():
-    motion = Motion(Sweep(1.0, 2.6, 8), 0.0)
+@pytest.mark.parametrize("senses, alpha", [((-1, 1), 0.0), ((-1,), -1.0), ((1,), 1.0)])
+def test_a_bore_at_rest_moves_the_linkage_against_its_friction(senses, alpha):
+    """An acceleration says which way it starts."""
+    motion = Motion(Sweep(1.0, 2.6, 8), 0.0, alpha)
     rubbing = {"loads": (SPIKE,), "effects": (Friction.at(O2=5.0),), "drive": CYLINDER}
-    creeping = Motion(np.full(2, CORNERS[2]), np.array([-1e-9, 1e-9]))
-    force = np.abs(solve(crank_rocker(motion=creeping, **rubbing)).drive_force).max()
+    speed = 1e-9 * np.array(senses)
+    creeping = crank_rocker(
+        motion=Motion(0.0 * speed + CORNERS[2], speed, alpha), **rubbing
+    )
+    creeps = solve(creeping)
+    force = np.abs(creeps.drive_force).max()
+    pin = np.hypot(*creeps.F12.T).max()
     bore = 1e3 * sqrt(4.0 * force / (pi * 210e5))
     text = block(crank_rocker(motion=motion, **rubbing), pressure=210e5)
+    assert f"to move {pin:.4g} N" in text
     assert re.search(rf"{bore:.4g} mm\b[^;]* to pull {force:.4g} N", text)
 
 

@@ -354,3 +354,12 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     least = Facts(solve(scene)).transmission
     # 20 000 steps of a turn miss an angle that grows as the root at a limit
     assert least.value == approx(asin(np.nanmin(np.abs(sines))), abs=1e-3)
+
+
+def test_transmission_angle_of_a_release_is_zero_on_its_change_points():
+    scene = Scene(
+        FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1, mass=1.0)),
+        Motion(0.5, 10.0, free=Free(0.7, 6)),
+    )
+    solution = solve(scene)
+    assert Facts(solution).transmission == (0.0, solution.change_points[0])

@@ -380,6 +380,17 @@ def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, posit
     assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
 
 
+def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_moment():
+    """That of bar 4 has no pin forces: m g c/8 at 0 deg."""
+    linkage = fourbar.uniform(*PARALLELOGRAM)
+    motion = Motion(Sweep(0.0, tau, 12), 1.0)
+    figure = composed(fourbar.Scene(linkage, motion, effects=(Gravity(),)), "bars")
+    words = " ".join(figure.subfigs[0].get_supxlabel().split())
+    moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50.0 mm" in words
+    assert "Pin forces grow without bound" in words
+
+
 def test_what_stands_at_an_axis_is_whole():
     """A name that is too long for three columns, a power of ten, and a place at 0."""
     points = tuple(Point(30 * name, 3, (0.1, 0.7)) for name in "PQR")
