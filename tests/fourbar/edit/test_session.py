@@ -467,7 +467,7 @@ def test_a_bar_that_is_shown_turning_back_is_commanded_at_a_speed(session, dead_
     """It is that of the middle of its swing, where the shown position has none."""
     limits = fourbar.limit_positions(session.now.scene.linkage, 4)
     theta_2 = [one.theta_2 for one in limits if one.branch == 1][dead_centre]
-    ask(session, {"do": "command", "command": "theta_4", "theta_2": theta_2})
+    ask(session, "command", command="theta_4", theta_2=theta_2)
     assert 1.0 < abs(session.now.scene.motion.speed) < 10.0
 
 
