@@ -14,7 +14,15 @@ import pytest
 from pytest import approx, raises
 
 import fourbar
-from tests.support.robots import FOOT, GRIPPER, Planar, forward, read_scene
+from fourbar.scene.motion import OPEN
+from tests.support.robots import (
+    FOOT,
+    GRIPPER,
+    Planar,
+    draw_knee,
+    forward,
+    read_scene,
+)
 from tests.support.rows import read_rows
 from tests.support.scenes import find_angle, meet_circles
 
@@ -215,3 +223,11 @@ def test_a_pose_in_a_change_point_is_said():
     upright = {"right_driver": "90deg"}
     made = read_scene(text, loop="right_finger-right_follower", joints=upright)
     assert any("in line in this pose" in remark for remark in made.remarks)
+
+
+@pytest.mark.parametrize("drawn", [0, 180])
+def test_of_a_loop_that_is_drawn_in_line_the_open_assembly_is_taken(drawn):
+    made = read_scene(draw_knee(drawn))
+    assert made.scene.motion.branch == OPEN
+    (said,) = (remark for remark in made.remarks if "in line" in remark)
+    assert said.endswith("in this pose: open is taken; --pose states another")
