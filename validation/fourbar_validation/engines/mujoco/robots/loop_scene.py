@@ -1,7 +1,8 @@
 """A scene from a loop of a robot: lengths, masses, effects and range, in the pose.
 
 Everything else is held. What hangs on a bar by other joints is held as it stands and
-counts with its mass. What a scene cannot hold is named with its size.
+counts with its mass. Lengths are read within the digits of the file. What a scene
+cannot hold is named with its size.
 """
 
 import cmath
