@@ -139,6 +139,7 @@ ACROSS_LINES = [
     ('title = "good"', '"a\\nb\\u001b[31m" = 1', "a b [31m = 1", "unknown key"),
     ('"open"', '"\\n\\u001b[2J\\u202e"', "motion.branch", "\\x1b", "\\u202e"),
     ('title = "good"', "k" * 50000 + " = 1", "unknown key"),
+    (GOOD, ".".join(["1"] * 203) + " = 1", "more than 100 dots besides those of"),
     (GOOD, "<mujoco/>", "TOML", "'<mujoco/>': Invalid statement (at line 1, column 1)"),
     (GOOD, 'title = "a"\n\n[lengths\nground = 1', "TOML = '[lengths'"),
 ]
@@ -224,6 +225,12 @@ def test_large_nonsense_is_answered_soon(pattern):
     text = "".join(pattern.format(n=n) for n in range(times))
     with soon(), raises(FourBarError):
         loads(text, "nonsense")
+
+
+def test_a_line_may_have_many_decimals():
+    angles = ", ".join(f'"{n}.5 deg"' for n in range(200))
+    scene = loads(GOOD.replace('"60 deg"', f"[{angles}]"))
+    assert len(scene.motion.angle) == 200
 
 
 def test_forces_and_gravity_by_components():
