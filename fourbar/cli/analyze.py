@@ -387,13 +387,13 @@ def _write_summary(
 
     One position that answers `--at` has a block, several have a line each.
     """
-    from fourbar.show.block import write_block
+    from fourbar.show.block import SceneBlock
     from fourbar.show.located import list_positions
     from fourbar.show.path_rows import write_paths
 
     if not asked:
-        block = write_block(solution, units, pressure=pressure, width=width)
-        return "\n".join([*block, *write_paths(solution, units), ""])
+        block = SceneBlock(solution, units, pressure, width)
+        return "\n".join([*block.write(), *write_paths(solution, units), ""])
     lines: list[str] = []
     headed = True
     for text, at in asked.items():
@@ -402,9 +402,9 @@ def _write_summary(
             continue
         one = solve(scene, find_last_stage(scene), at=at)
         follow(scene, one)
-        block = write_block(one, units, pressure=pressure, headed=headed, width=width)
+        block = SceneBlock(one, units, pressure, width)
+        lines += [*block.write(headed=headed), ""]
         headed = False
-        lines += [*block, ""]
     return "\n".join(lines)
 
 

@@ -136,27 +136,17 @@ def ends_in(out: Path | None, suffix: str) -> bool:
 
 
 class LengthsCommand(click.Command):
-    """A command of four lengths, which says who serves more, and who a scene file."""
+    """A command of four lengths, which says who serves another number of them."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the arguments."""
-        words = [*args]  # click takes from the list what it reads
         try:
             return super().parse_args(ctx, args)
         except click.UsageError as error:
-            message = error.message
-            if re.search(r"unexpected extra arguments? \([\d.]", message):
-                message += f": {ELSEWHERE}"
-            elif not message.endswith("takes 4 values."):
+            message = error.message.removesuffix(".")
+            if not re.search(r"extra arguments? \([\d.]|takes 4 values", message):
                 raise
-            else:
-                message = f"{message.removesuffix('.')}: {', '.join(LENGTH_NAMES)}"
-                scenes = [word for word in words if word.endswith(".toml")]
-                if scenes:
-                    message += f"; for a scene file: fourbar analyze {scenes[0]}"
-                else:
-                    message += f"; {ELSEWHERE}"
-            raise click.UsageError(message, ctx) from None
+            raise click.UsageError(f"{message}: {ELSEWHERE}", ctx) from None
 
 
 @contextmanager

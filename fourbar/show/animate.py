@@ -46,7 +46,6 @@ from fourbar.show.plot.style import format_of, shorten_text
 from fourbar.show.plot.symbols import Symbol, list_acting
 from fourbar.show.plot.view import (
     describe_change_points,
-    find_drawn_place,
     is_over_time,
     list_sweep,
     set_branch,
@@ -192,12 +191,12 @@ def _collect_shown(
     motion = scene.motion
     over_time = is_over_time(scene)
     made = solve(scene) if over_time else None
-    covered = list_sweep(scene) if made is None else made.at
+    covered, place = list_sweep(scene) if made is None else (made.at, None)
     at = thin_out(covered)
     places = at.places
     commanded = covered.commanded
     name = "time" if over_time else commanded
-    start = None if over_time else _find_start(scene, at)
+    start = None if place is None else int(np.argmin(np.abs(places - place)))
     if solved is not None and not np.array_equal(places, solved.at.places):
         solved = None
     branches = {}
@@ -257,21 +256,6 @@ def _count_turns_from(row: int, solution: Solution) -> None:
         angles = getattr(solution, name)
         if name != solution.commanded and np.isfinite(angles[row]):
             angles -= math.tau * np.ceil(angles[row] / math.tau - 0.5)
-
-
-def _find_start(scene: Scene, shown: Command) -> int | None:
-    """Return the shown position that is nearest to the one stated or drawn, if any."""
-    stated = command(scene)
-    drawn = find_drawn_place(scene)
-    if len(stated.angle) > 1:
-        if drawn is None:
-            return None
-        away = shown.places - drawn
-    elif stated.moves_stroke:
-        away = shown.places - stated.places
-    else:
-        away = np.angle(np.exp(1j * (shown.angle - stated.angle[0])))
-    return int(np.argmin(np.abs(away)))
 
 
 def thin_out(positions: Command) -> Command:

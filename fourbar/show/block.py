@@ -98,21 +98,6 @@ BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
 
 
-def write_block(
-    solution: Solution,
-    units: Conversion = COMMON,
-    *,
-    pressure: float | None = None,
-    headed: bool = True,
-    width: int | None = None,
-) -> list[str]:
-    """Write the summary of a solved scene line by line; of one position, everything.
-
-    The parameters are those of `SceneBlock` and its `write`.
-    """
-    return SceneBlock(solution, units, pressure, width).write(headed=headed)
-
-
 class SceneBlock(Facts):
     """Facts of a solved scene with the units that they are written in.
 
@@ -127,7 +112,7 @@ class SceneBlock(Facts):
     def __init__(
         self,
         solution: Solution,
-        units: Conversion,
+        units: Conversion = COMMON,
         pressure: float | None = None,
         width: int | None = None,
     ) -> None:

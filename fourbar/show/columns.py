@@ -9,7 +9,6 @@ place with two coordinates, `omega_4/omega_2` a ratio, `theta_3-theta_2` a diffe
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import NamedTuple
 
 import numpy as np
@@ -187,20 +186,14 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
         return InputError("--columns", name, f"unknown; {ELSEWHERE}")
     if _is_number(with_speed, name):
         return _ask_for_speed(scene, name)
-    known = ["time", *list_column_quantities(with_speed)]
-    if name in ("status", "branch", "drive_bar"):
-        text = "is no quantity: --csv without --columns has it"
-        return InputError("--columns", name, text)
     reaction = re.sub(r"^F(\d)(\d)", r"F\2\1", name)
     if reaction != name and _is_number(with_speed, reaction):
         return InputError("--columns", name, f"is the reaction of {reaction}: minus it")
-    close = get_close_matches(name, known, 1)
-    hint = f'did you mean "{close[0]}"? ' if close else ""
     there = ", ".join(["time", *list_column_quantities(solution)])
     return InputError(
         "--columns",
         name,
-        f"unknown; {hint}quantities are {there}; F12_x is a component, omega_4/omega_2"
+        f"unknown; quantities are {there}; F12_x is a component, omega_4/omega_2"
         " a ratio, theta_3-theta_2 a difference, F_P/F_Q the ratio of the forces along"
         " the paths of two points",
     )

@@ -363,12 +363,10 @@ class _Fit(NamedTuple):
     """Estimate of the error of each, (p,); infinite where some values are missing, zero
     where all are.
     """
-    most: Array
-    """Largest value, or size of a vector, (p,); -inf where all are missing."""
-    least: Array
-    """Least value of a scalar, (p,); inf where all are missing, and of a vector."""
-    size: Array
-    """Largest size, (p,); 0 where all are missing."""
+    sizes: Array
+    """Values of a scalar, or sizes of vectors, at the nodes and beside the ends,
+    (p, NODES + 2); NaN where they are missing.
+    """
 
 
 def fit_panels(
@@ -392,7 +390,7 @@ def fit_panels(
     usual = {}
     for name, fit in fits.items():
         # a node next to a pole does not change the size of a curve
-        medians = np.median(np.nan_to_num(np.abs(_measure(fit.values))), axis=1)
+        medians = np.median(np.nan_to_num(np.abs(fit.sizes[:, 1:-1])), axis=1)
         scale = medians.max() or 1.0
         usual[name] = float(scale * np.sqrt(np.square(medians / scale).mean()))
     opens: dict[str, NDArray[np.bool_]] = {}
@@ -401,7 +399,8 @@ def fit_panels(
         share = (stop - start) / (edges[-1] - edges[0])
         for name, fit in fits.items():
             is_open = _find_open(fit, share, usual[name], wanted[name])
-            noise = _NOISE * 2.0**halvings * fit.size
+            size = np.fmax.reduce(np.abs(fit.sizes), axis=1)
+            noise = _NOISE * 2.0**halvings * size
             opens[name] = is_new & is_open & ~(fit.error <= noise)
         halved = np.any([*opens.values()], axis=0)
         if halvings == most_halvings or not 0 < halved.sum() <= _MOST_OPEN:
@@ -432,19 +431,14 @@ def _find_open(
     wanted: Wanted,
 ) -> NDArray[np.bool_]:
     """Mark the panels that are halved: for an extreme value, or for the integrals."""
-    most = float(fit.most.max())
-    least = float(fit.least.min())
-    scale = max(abs(most), abs(least)) if np.isfinite(least) else abs(most)
-    highest = fit.most + fit.error
-    with np.errstate(invalid="ignore"):
-        lowest = fit.least - fit.error
+    most = float(np.fmax.reduce(fit.sizes, axis=None))
+    least = float(np.fmin.reduce(fit.sizes, axis=None))
+    scale = max(abs(most), abs(least))
+    highest: Array = np.fmax.reduce(fit.sizes, axis=1) + fit.error
+    lowest: Array = np.fmin.reduce(fit.sizes, axis=1) - fit.error
     if wanted.zeros:
         return (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
-    may_exceed = highest >= most
-    if wanted.ranged:
-        may_exceed |= lowest <= least
-    else:
-        may_exceed |= -lowest >= scale
+    may_exceed = (highest >= most) | (lowest <= (least if wanted.ranged else -scale))
     is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + wanted.rounding)
     if wanted.integrated:
         is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
@@ -495,10 +489,5 @@ def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, 
         error = np.maximum(terms, beside).max(axis=-1)
         error = np.where(missing.any(axis=1), np.inf, error)
         error[missing.all(axis=1)] = 0.0
-        single = curve.shape[-1] == 1
-        sizes = _measure(curve)
-        most = np.where(missing, -np.inf, sizes).max(axis=1)
-        least = np.where(missing | (not single), np.inf, sizes).min(axis=1)
-        size = np.where(missing, 0.0, np.abs(sizes)).max(axis=1)
-        fits[name] = _Fit(values, error, most, least, size)
+        fits[name] = _Fit(values, error, np.where(missing, np.nan, _measure(curve)))
     return fits

@@ -86,8 +86,8 @@ def units(text: str) -> Conversion:
     for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
         unit = next((unit for unit in STATABLE_UNITS if converts(name, unit)), None)
         if unit is None:
-            reason = f"is no unit of a result{_hint_at_unit(name)}"
-            raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
+            reason = f"is no unit of a result; {ALLOWED_UNITS}"
+            raise InputError("units", name, reason)
         if unit in stated:
             reason = f"is the second unit for {unit}"
             raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
@@ -106,20 +106,6 @@ def units(text: str) -> Conversion:
     return {
         unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()
     } or SI
-
-
-def _hint_at_unit(name: str) -> str:
-    """Suggest the unit that a name may stand for; empty if none is near."""
-    from fourbar.quantities.units import UnitError, to_si
-
-    for unit in STATABLE_UNITS:
-        try:
-            to_si(f"1 {name}", unit)
-        except UnitError as error:
-            hint = str(error).replace('"1 ', '"').partition("; ")[2]
-            if hint:
-                return f"; {hint}"
-    return ""
 
 
 def units_of_length(length: str) -> Conversion:

@@ -276,18 +276,19 @@ def is_over_time(scene: Scene) -> bool:
     return scene.motion.free is not None or scene.motion.law is not None
 
 
-def list_sweep(scene: Scene) -> Command:
+def list_sweep(scene: Scene) -> tuple[Command, float | None]:
     """List the positions in ascending order of what is commanded.
 
-    A single one is put among those of the default range.
+    A single one is put among those of the default range. The place of a single one, or
+    of the one that is drawn, is returned too.
     """
     stated = command(scene)
     if len(stated.angle) > 1:
         places = np.sort(stated.places, kind="stable")
         drawn = find_drawn_place(scene)
         if drawn is not None and places[0] < drawn < places[-1]:
-            return command_at(scene, np.unique([*places, drawn]))
-        return stated.part(np.argsort(stated.places, kind="stable"))
+            return command_at(scene, np.unique([*places, drawn])), drawn
+        return stated.part(np.argsort(stated.places, kind="stable")), drawn
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     place = stated.places
     if not stated.moves_stroke:
@@ -295,7 +296,8 @@ def list_sweep(scene: Scene) -> Command:
         middle = 0.5 * (wide.angle[0] + wide.angle[-1])
         turns = np.round((middle - stated.angle) / math.tau)
         place = place + turns * math.tau
-    return command_at(scene, np.unique(np.concatenate([wide.places, place])))
+    places = np.unique(np.concatenate([wide.places, place]))
+    return command_at(scene, places), float(place[0])
 
 
 def find_drawn_place(scene: Scene) -> float | None:
@@ -339,7 +341,7 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     NotAssembledError : no position of the sweep assembles, or the one named does not.
     """
     over_time = is_over_time(scene)
-    sweep = solve(scene) if over_time else solve(scene, at=list_sweep(scene))
+    sweep = solve(scene) if over_time else solve(scene, at=list_sweep(scene)[0])
     if not sweep.assembled.any():
         raise NotAssembledError(
             "nothing to draw: the linkage assembles at none of the scene's positions"

@@ -604,8 +604,7 @@ sdf --lengths 1 2 3 4 5 -o f.sdf | several loops (six bars) in PMKS+
 analyze @crank_rocker.toml --at 'theta_5=30 deg' | several loops (six bars) in PMKS+
 analyze @crank_rocker.toml --columns omega_6/omega_2 | several loops (six bars) in
 analyze @crank_rocker.toml --columns F56_x | several loops (six bars) in PMKS+
-classify scene.toml | for a scene file: fourbar analyze scene.toml
-classify 1 2 3 | 4 values: ground, input, coupler, output
+classify 1 2 3 | takes 4 values
 analyze @crank_rocker | did you mean "
 
 # positions of another scene

@@ -38,7 +38,7 @@ from fourbar import (
 )
 from fourbar.files.scene_file import read_tables
 from fourbar.quantities import PIN_FORCES
-from fourbar.show.block import write_block
+from fourbar.show.block import SceneBlock
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
 from fourbar.show.summary import Facts
@@ -397,7 +397,7 @@ def test_the_block_says(name):
 def test_the_block_has_the_numbers_of_the_facts():
     scene = crank_rocker(motion=turn(360))
     facts = Facts(solve(scene, "error"))
-    text = "\n".join(write_block(facts.solution))
+    text = "\n".join(SceneBlock(facts.solution).write())
     duty = facts.duty
     peak = facts.peak
     torque, rms, most = 1e3 * np.array([peak.value, duty.rms_torque, duty.peak_torque])
@@ -584,7 +584,7 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
         solve(crank_rocker(motion=Motion(angle, speed), **rubbing))
         for speed in (0.0, 1e-9, -1e-9)
     )
-    lines = write_block(at_rest, units("N N.m"))
+    lines = SceneBlock(at_rest, units("N N.m")).write()
     rows = [line for line in lines if line.startswith("  to move")]
     names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
     motions = [Facts(way).motion for way in ways]

@@ -84,7 +84,7 @@ furlong | unit
 mm in | unit
 N.mm J | unit
 m^2 | unit
-mm lb-in | did you mean "lbf-in"
+mm lb-in | no unit of a result; must be "SI"
 inches pounds | write lbf for pounds-force
 in lb | write lbf for pounds-force
 mm lbs deg | write lbf for pounds-force
