@@ -15,6 +15,7 @@ from fourbar import (
     FourBar,
     Free,
     Gravity,
+    Law,
     Load,
     Motion,
     Point,
@@ -168,13 +169,14 @@ def test_a_release_has_the_limits_of_its_own_motion(gravity):
 RELEASED = Motion(0.0, 6.0, free=Free(1.0, 10))
 ONE_SIDED = [
     Motion(law=Rise("cycloidal", (1.0, 1.0), theta_2=0.0)),
+    Motion(law=Law((-0.3, -0.2, -0.1, 0.0), (-0.3, -0.2, -0.1, 0.0), ends="free")),
     RELEASED,
     RELEASED.replace(speed=0.0),
 ]
 
 
-@pytest.mark.parametrize("motion", slow_but(ONE_SIDED[:1], ONE_SIDED))
-def test_a_motion_that_begins_or_stands_still_has_no_limit(motion):
+@pytest.mark.parametrize("motion", slow_but(ONE_SIDED[:2], ONE_SIDED))
+def test_a_motion_that_begins_ends_or_stands_still_has_no_limit(motion):
     rows, _ = write_forces(motion, at=("time", "0 s"))
     assert "begins, ends or stands still there, and has one side alone" in rows[-1]
     assert numbers(rows[1]) == []

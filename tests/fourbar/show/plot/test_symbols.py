@@ -10,6 +10,7 @@ from math import copysign, cos, pi, sin, tau
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
 
 import fourbar
 from fourbar import Motion, Point, Table, solve
@@ -149,7 +150,7 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(Point("P", 3, (0.15, 0.7)),))
     solution = motion_curves.describe_motion(solve(scene)).solve_with_peaks()
-    units = fourbar.units("m m/s m/s^2")
+    units = fourbar.units("mm m/s m/s^2")
     figure = figures.draw_figure(scene, "points", units=units).figure
     paths, speeds, accelerations = (
         {line.get_label(): line.get_xydata() for line in panel.lines}
@@ -161,6 +162,10 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
         (accelerations, solution.acceleration["P"]),
     ):
         assert np.allclose(lines["P"][:, 1], np.hypot(*values.T), rtol=1e-15)
+    arrows = figure.subfigs[0].axes[0].findobj(FancyArrowPatch)
+    feet = [complex(*arrow._posA_posB[0]) for arrow in arrows]
+    at = 1e3 * complex(*view.make_view(scene).here.points["P"][0])
+    assert sum(abs(foot - at) < 1e-9 for foot in feet) == 2
     (point,) = animate.collect_page_data(scene, {})["points"]
     assert point["name"] == "P"
     assert abs(complex(*point["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
