@@ -17,7 +17,6 @@ from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
-    PARALLELOGRAM,
     bare,
 )
 
@@ -119,16 +118,20 @@ def test_what_touches_is_up_to_the_rounding_of_the_lengths(stated, touches):
     assert bars[:4] == approx(lengths, rel=4.0 * U)
 
 
-LINKAGES = [
-    CRANK_ROCKER_LENGTHS,
-    (0.25, 0.22, 0.3, 0.1),
-    PARALLELOGRAM,  # a parallelogram
-    (0.1, 0.3, 0.3, 0.1),  # kites; with the second A lies on O4 at theta_2 = theta_1
-    (0.3, 0.3, 0.2, 0.2),
-    (0.2, 0.2, 0.2, 0.2),
-    (0.08, 0.24, 0.2, 0.26),  # input longer than the ground
-    (0.4, 0.35, 0.1, 0.08),  # 4 a d > 4 b c, and few positions close
-]
+LINKAGES = read_rows("""
+0.3 0.1 0.25 0.22
+0.25 0.22 0.3 0.1
+# a parallelogram, and kites; with the second A lies on O4 at theta_2 = theta_1
+0.3 0.1 0.3 0.1
+0.1 0.3 0.3 0.1
+0.3 0.3 0.2 0.2
+0.2 0.2 0.2 0.2
+# input longer than the ground
+0.08 0.24 0.2 0.26
+# 4 a d > 4 b c, and few positions close
+0.4 0.35 0.1 0.08
+0.4 0.397 0.003 0.002
+""")
 
 
 def five(bars, psi):
@@ -158,8 +161,8 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     plain = np.append(np.linspace(-7.0, 7.0, 40), pi)
     psi = np.concatenate([near, -near, pi - near, near - pi, plain, *turns])
     with mp.workdps(200):
-        for lengths in [*LINKAGES, (0.4, 0.397, 0.003, 0.002)]:
-            bars = uniform(*lengths)
+        for (lengths,) in LINKAGES:
+            bars = uniform(*map(float, lengths.split()))
             half = half_angle(loop(*bars.lengths), psi)
             d, a, b, c, E1, E2 = loop(*bars.lengths)
             for i, angle in enumerate(psi):
