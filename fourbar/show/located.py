@@ -15,7 +15,7 @@ from fourbar.quantities.units import NUMBER_TEXT
 from fourbar.scene import Command, Scene
 from fourbar.show.columns import read_column
 from fourbar.show.shown_units import drop_rounding
-from fourbar.solution import where_assembled
+from fourbar.solution import Solution, where_assembled
 from fourbar.solving import find_last_stage
 from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import (
@@ -80,21 +80,27 @@ class _LocatedSearch:
         if find_last_stage(scene) == "position" or name in STATED_POSITIONS:
             stage = "position"
         self.course = MotionCourse(scene, stage)
-        self.places = self.course.places
         self.commanded = self.course.commanded
         column = read_column(self.course.solution, name)
         self.unit = column.unit if column.label({}) else "1"
         """SI unit; that of a pure number is 1."""
         if "1" not in (self.unit, column.divisor):
             self.unit = f"({column.unit})/({column.divisor})"
-        self.values = where_assembled(self.course.solution, column.values)
+        # beside a position without a value it may grow without bound
+        self.course.refine(lambda solution: np.isfinite(self._read_column(solution)))
+        self.places = self.course.places
+        self.values = self._read_column(self.course.solution)
         self.is_extreme = np.zeros(len(self.values), dtype=bool)
 
     def _read(self, places: Array) -> Array:
         """Return the column at places in an array of any shape."""
         solution = self.course.solve(np.ravel(places))
-        column = read_column(solution, self.name)
-        return where_assembled(solution, column.values).reshape(np.shape(places))
+        return self._read_column(solution).reshape(np.shape(places))
+
+    def _read_column(self, solution: Solution) -> Array:
+        """Return the column at positions, NaN where the linkage does not assemble."""
+        values = read_column(solution, self.name).values
+        return where_assembled(solution, values)
 
     def _gap(self, places: Array, value: Array | float) -> Array:
         """Return how far the column at places is from values, in an array of any shape.

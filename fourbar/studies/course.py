@@ -91,11 +91,7 @@ class MotionCourse:
         """Commanded angles or strokes, or times, in the order of the motion, (n,)."""
         self.solution = self.solve(self.places)
         """Solution at the places."""
-        assembled = self.solution.assembled
-        edges = np.flatnonzero(assembled[1:] != assembled[:-1])
-        if edges.size:
-            self.places = self._refine_edges(edges, assembled)
-            self.solution = self.solve(self.places)
+        self.refine(lambda solution: solution.assembled)
 
     @property
     def commanded(self) -> str:
@@ -141,23 +137,20 @@ class MotionCourse:
             places = np.union1d(places[apart > SAME_PLACE * np.ptp(places)], knots)
         return places
 
-    def _refine_edges(
-        self,
-        rows: NDArray[np.intp],
-        assembled: NDArray[np.bool_],
-    ) -> Array:
-        """Return the places with more of them where the linkage ceases to assemble."""
-        before = assembled[rows]
+    def refine(self, holds: Callable[[Solution], NDArray[np.bool_]]) -> None:
+        """Add places where a condition, such as that it assembles, ceases to hold."""
+        held = holds(self.solution)
+        rows = np.flatnonzero(held[1:] != held[:-1])
+        if not rows.size:
+            return
+        before = held[rows]
         inside = np.where(before, self.places[rows], self.places[rows + 1])
         outside = np.where(before, self.places[rows + 1], self.places[rows])
-        edge, _ = bisect(
-            lambda places: self.solve(places).assembled,
-            inside,
-            outside,
-        )
+        edge, _ = bisect(lambda places: holds(self.solve(places)), inside, outside)
         more = edge[:, None] + (inside - edge)[:, None] * LADDER
         places = np.unique(np.concatenate([self.places, more.ravel(), edge]))
-        return places if self.places[0] <= self.places[-1] else places[::-1]
+        self.places = places if self.places[0] <= self.places[-1] else places[::-1]
+        self.solution = self.solve(self.places)
 
 
 def bisect(

@@ -1,7 +1,7 @@
 """Positions at which a column has a value, against closed forms."""
 
 from dataclasses import replace
-from math import acos, asin, pi, radians, sin, sqrt
+from math import acos, asin, pi, radians, sin, sqrt, tau
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from fourbar import (
     Sweep,
     release,
     solve,
+    uniform,
 )
 from fourbar.errors import FourBarError
 from fourbar.files import loads
@@ -325,3 +326,14 @@ def test_springs_have_their_length_and_pull_as_columns():
     assert force.values == approx(20.0 * (distance - 0.7) - 1.0, abs=1e-12)
     with raises(InputError, match="is the name of a quantity"):
         Point("spring_1_force", 3, (0.1, 0.0))
+
+
+def test_a_force_grows_without_bound_beside_a_change_point():
+    linkage = uniform(0.3, 0.1, 0.3, 0.1)
+    scene = Scene(linkage, Motion(Sweep(0.0, tau, 12), 1.0), effects=(Gravity(),))
+    found = locate(scene, "F14", "5 kN").places
+    assert len(found) == 4 and np.abs(np.sin(found)).max() < 0.01
+    forces = solve(replace(scene, motion=Motion(found, 1.0))).F14
+    assert np.hypot(*forces.T) == approx(5e3, rel=1e-9)
+    with raises(NotAssembledError, match="it has none, and grows without bound"):
+        locate(scene, "F14", "max")
