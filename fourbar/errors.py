@@ -24,7 +24,7 @@ LONGEST_VALUE = 160
 """Characters of a value that an error repeats."""
 LONGEST_MESSAGE = 400
 """Characters of the line that a command prints of an error."""
-LONGEST_LIST = 300
+LONGEST_LIST = 220
 """Characters of the names that an error lists; they are whole, the others counted."""
 ELSEWHERE = (
     "this is a planar four-bar linkage with pins alone: synthesis of paths is in "
@@ -103,6 +103,8 @@ def abbreviate(text: str, longest: int) -> str:
 def list_allowed(wrong: str, names: Iterable[str]) -> str:
     """Say what names are allowed in place of a wrong one, those like it first.
 
+    Then come those that share most parts of a dotted name.
+
     Names are whole; those beyond LONGEST_LIST characters are counted. For a name of
     another mechanism the address is returned.
 
@@ -116,6 +118,12 @@ def list_allowed(wrong: str, names: Iterable[str]) -> str:
     names = list(names)
     like = [name for name in names if wrong.casefold() in name.casefold()]
     like += get_close_matches(wrong, names)
+    parts = wrong.split(".")
+
+    def count_shared(name: str) -> int:
+        return len(os.path.commonprefix([parts, name.split(".")]))  # noqa: RUF071
+
+    names.sort(key=count_shared, reverse=True)
     listed = list(dict.fromkeys([*like, *names]))
     shown = len(listed)
     while shown > 1 and len(", ".join(listed[:shown])) > LONGEST_LIST:

@@ -433,10 +433,10 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
         tolerance = Entry(table.file, f'tolerances."{key}"', stated)
         if key not in entries:
             allowed = (
-                "a commanded value has no tolerance; its speed and acceleration may"
-                " have one"
+                "a commanded value has no tolerance; a speed or acceleration that is"
+                " one for all positions may have one"
             )
-            if key not in COMMAND_KEYS:
+            if not key.startswith(("motion.law.", *COMMAND_KEYS)):
                 allowed = refuse_key(key, stated, list(entries)).allowed
             raise tolerance.refuse(allowed)
         unit = entries[key].unit

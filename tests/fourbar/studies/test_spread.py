@@ -132,6 +132,7 @@ BAD = read_rows("""
 "bars.input.inertia" = "1 kg m^2" | follows the length
 "bars.input.centre" = "1 mm" | must be among bars.input.centre.0
 "motion.theta_2" = "1 deg" | a commanded value has no tolerance
+"motion.law.rise.0" = "1 deg" | a commanded value has no tolerance
 """)
 
 
