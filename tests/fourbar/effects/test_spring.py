@@ -44,7 +44,7 @@ def test_a_spring_whose_ends_meet_once_loses_that_position_alone():
 def continuous(scene, pin):
     """theta_j - theta_i along a sweep, each position from the one before."""
     solution = solve(scene, "position")
-    angle = {1: np.full(len(solution), scene.linkage.ground_angle), 2: solution.theta_2}
+    angle = {1: scene.linkage.ground_angle, 2: solution.theta_2}
     angle |= {3: solution.theta_3, 4: solution.theta_4}
     i, j = PINS[pin]
     between = angle[j] - angle[i]

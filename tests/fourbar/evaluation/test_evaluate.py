@@ -74,16 +74,6 @@ def near_a_limit(effect):
     return Scene(linkage, Motion(angles, 1.0), effects=(effect,))
 
 
-def exactly_one():
-    """Force and couple of 1 at the crank's own pin.
-
-    Nothing is rounded but the result.
-    """
-    bars = FourBar(0.3, Bar(0.1, centre=(0.0, 0.0)), Bar(0.25), Bar(0.22))
-    load = Load(2, (1.0, 0.0), moment=1.0)
-    return Scene(bars, Motion([0.3, 1.0], 1.0), loads=(load,))
-
-
 def far_away(angle, ground_angle):
     """Move the angles of a crank-rocker; less a ground at 0 rad they are exact."""
     scene = sized()
@@ -93,7 +83,13 @@ def far_away(angle, ground_angle):
 
 
 SCENES = {f"{k:g} m": sized(k) for k in (1.0, 1e60, 1e-60, 1e-75, 1e100)}
-SCENES |= {"centres of many turns": sized(turns=TURNS), "one": exactly_one()}
+SCENES["centres of many turns"] = sized(turns=TURNS)
+# force and couple of 1 at the crank's own pin: nothing is rounded but the result
+SCENES["one"] = Scene(
+    FourBar(0.3, Bar(0.1, centre=(0.0, 0.0)), Bar(0.25), Bar(0.22)),
+    Motion([0.3, 1.0], 1.0),
+    loads=(Load(2, (1.0, 0.0), moment=1.0),),
+)
 SCENES |= {
     f"{angle:g} rad, ground at {ground_angle} rad": far_away(angle, ground_angle)
     for angle in (1e3, 1e6, 1e8, 4e9)

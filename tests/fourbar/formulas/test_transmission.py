@@ -20,12 +20,6 @@ ANGLE = 16.0 * EPS
 SCAN = 4001
 
 
-def derive_at(name, bars, theta_2, branch):
-    """Derive a quantity where the input turns at 3 rad/s."""
-    motion = Motion(np.array(theta_2, ndmin=1), 3.0, branch=branch)
-    return derive(solve(Scene(bars, motion)), name)
-
-
 def test_transmission_angle_is_the_acute_angle_between_coupler_and_output():
     with mp.workdps(50):
         for drawn in random_positions(21, 60, 1e-4):
@@ -35,7 +29,8 @@ def test_transmission_angle_is_the_acute_angle_between_coupler_and_output():
             at_B = mp.acos((squares + 2 * a * d * mp.cos(psi)) / (2 * b * c))
             slope = float(a * d / (b * c)) + 1.0  # of mu sin(mu) over psi
             size = max(1.0, float(a * a + d * d) / float(b * c))
-            mu = derive_at("transmission", *drawn)[0]
+            motion = Motion(drawn.theta_2, branch=drawn.branch)
+            (mu,) = derive(solve(Scene(drawn.bars, motion)), "transmission")
             error = mu - min(at_B, mp.pi - at_B)
             assert abs(error) <= ANGLE * (slope + size) / drawn.sine
 
