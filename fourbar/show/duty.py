@@ -32,6 +32,8 @@ class BearingLoad(NamedTuple):
     """
     where: float | None
     """theta_2 of the largest load, rad."""
+    time: float | None = None
+    """Time of it along a law or a release, s."""
 
 
 class MotorDuty(NamedTuple):
@@ -173,7 +175,8 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     if peak is None:
         return BearingLoad(None, None, None)
     where = motion.find_theta_2(peak.place)
-    return BearingLoad(peak.value, motion.find_rms(name), where)
+    time = None if solution.time is None else peak.place
+    return BearingLoad(peak.value, motion.find_rms(name), where, time)
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
@@ -270,7 +273,7 @@ def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
     if duty is None:
         return None
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
-    of_pin = {"peak": "N", "rms": "N", "theta_2": "rad"}
+    of_pin = {"peak": "N", "rms": "N", "theta_2": "rad", "time": "s"}
     return {
         "closed": duty.closed,
         **convert((getattr(duty, name) for name in si), si, units),

@@ -46,7 +46,7 @@ _MOST_SHOWN, _FEWEST_SHOWN = 6, 3
 block.
 """
 _MOST_RUNS = 5
-"""Intervals of theta_2 that one line names."""
+"""Intervals of theta_2, or of time, that one line names."""
 TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 
 
@@ -131,7 +131,8 @@ def _tabulate_parts(
 ) -> "Table":
     """Make the table of parts, each at its position, with so many digits."""
     rows = []
-    angle_unit, of_angle = find_unit_in("rad", units)
+    name, si, places = _list_places(spreads)
+    unit_of_place, of_place = find_unit_in(si, units)
     for part, worst in shown.items():
         spread = spreads.spreads[part]
         names = ("nominal", "deviation", "low", "high", "least", "greatest")
@@ -141,11 +142,11 @@ def _tabulate_parts(
         cleaned = (factor * drop_rounding(columns[:, worst], largest)).tolist()
         numbers = [write_cell(number, f".{digits}g") for number in cleaned]
         numbers[1] = write_cell(cleaned[1], ".3g")
-        angle = write_cell(of_angle * spreads.theta_2[worst], f".{digits}g")
+        place = write_cell(of_place * places[worst], f".{digits}g")
         most = write_cell(factor * spread.worst[worst], ".3g")
-        rows.append([part, unit, angle, *numbers, most])
+        rows.append([part, unit, place, *numbers, most])
     band = [f"\n{percentile:g} %" for percentile in BAND_PERCENTILES]
-    heads = ["", "\nunit", f"theta_2\n{angle_unit}", "\nnominal", "\nsigma", *band]
+    heads = ["", "\nunit", f"{name}\n{unit_of_place}", "\nnominal", "\nsigma", *band]
     heads += ["\nleast", "\ngreatest", "worst\n+-"]
     return make_plain_table(heads, rows, left=("",), gap=0)
 
@@ -199,16 +200,23 @@ def describe_parted(
     ]
 
 
+def _list_places(spreads: Tolerances) -> tuple[str, str, Array]:
+    """Return what tells the positions apart: its name, its SI unit and the values."""
+    if spreads.time is None:
+        return "theta_2", "rad", spreads.theta_2
+    return "time", "s", spreads.time
+
+
 def _name_positions(
     spreads: Tolerances, rows: NDArray[np.intp], units: Conversion
 ) -> str:
-    """Count positions, and name the first intervals of theta_2 that they fill."""
-    unit, factor = find_unit_in("rad", units)
+    """Count positions, and name the first intervals that they fill."""
+    name, si, values = _list_places(spreads)
+    unit, factor = find_unit_in(si, units)
     runs = split_runs(rows)
     ends = [
         " to ".join(
-            f"{factor * spreads.theta_2[i]:.6g}"
-            for i in dict.fromkeys((run[0], run[-1]))
+            f"{factor * values[i]:.6g}" for i in dict.fromkeys((run[0], run[-1]))
         )
         for run in runs
     ]
@@ -216,7 +224,7 @@ def _name_positions(
     if len(ends) > _MOST_RUNS:
         places += ", ..."
     positions = write_count(len(spreads.theta_2), "position")
-    return f"{rows.size} of {positions} (theta_2 = {places} {unit})"
+    return f"{rows.size} of {positions} ({name} = {places} {unit})"
 
 
 def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
@@ -308,6 +316,7 @@ def write_spreads_json(spreads: Tolerances) -> str:
         apart=spreads.apart,
         invalid=spreads.invalid,
         theta_2=spreads.theta_2,
+        time=spreads.time,
         without_value=spreads.without,
         quantities={
             part: {

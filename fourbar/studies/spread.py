@@ -111,6 +111,8 @@ class Tolerances:
     """
     invalid: int
     """Members with a number that no scene takes (a length below zero)."""
+    time: Array | None = None
+    """Times of the positions along a law, (n,), s."""
 
     def to_pandas(self) -> "DataFrame":
         """Make a table, a row for each quantity and position, in SI units and rad.
@@ -123,6 +125,8 @@ class Tolerances:
             "quantity": np.repeat(list(self.spreads), len(self.theta_2)),
             "theta_2": np.tile(self.theta_2, len(self.spreads)),
         }
+        if self.time is not None:
+            first["time"] = np.tile(self.time, len(self.spreads))
         names = [name for name in Spread._fields if name != "shares"]
         columns = {
             name: np.ravel([getattr(spread, name) for spread in self.spreads.values()])
@@ -255,6 +259,7 @@ def tolerances(
         without,
         int(gone.sum()),
         invalid,
+        slopes.solution.time,
     )
 
 

@@ -94,7 +94,10 @@ def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second):
     law = Law((0.0, 0.2, 0.5, 1.0), (0.1, second, 3.7, 0.1 + tau), ends="periodic")
     assert (law.at(np.zeros(1))[1] > 0.0) == (second > 0.0)
     damped = (Viscous.at(O2=0.01),)
-    duty = motor_duty(solve(crank_rocker(motion=Motion(law=law), effects=damped)))
+    solution = solve(crank_rocker(motion=Motion(law=law), effects=damped))
+    duty = motor_duty(solution)
+    load = bearing_load(solution, "A")
+    assert law.at(np.array([load.time]))[0] == approx(load.where)
     work = duty.energy_in - duty.energy_out
     # the difference of the energies has the roundings of the larger one
     assert duty.mean_torque * tau == approx(work, abs=ROUND_OFF * duty.energy_in)
@@ -154,6 +157,7 @@ def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
     assert (duty.energy_in, duty.energy_swing, duty.mean_torque) == (None, None, None)
     load = np.hypot(*s.F32.T)
     assert bearing_load(s, "A")[::2] == (load.max(), s.theta_2[load.argmax()])
+    assert bearing_load(s, "A").time is None
 
 
 def test_a_study_has_shaking_and_its_members_a_duty():

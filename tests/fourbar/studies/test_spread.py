@@ -149,10 +149,12 @@ def test_the_positions_at_which_first_order_fails_are_named_each():
     first_order = np.where(np.arange(73) == 40, np.nan, 1.0)
     parted = SimpleNamespace(parted=parted, first_order=first_order)
     degrees = np.radians(np.arange(0.0, 361.0, 5.0))
-    study = SimpleNamespace(theta_2=degrees, spreads={"torque": parted})
+    study = SimpleNamespace(theta_2=degrees, spreads={"torque": parted}, time=None)
     differ, alone = describe_parted(study, "torque")
     assert "at 4 of 73 positions (theta_2 = 0 to 5, 45, 360 deg)" in differ
     assert "first order has no value at 1 of 73 positions (theta_2 = 200" in alone
+    study.time = np.arange(73.0)  # of a law, which passes an angle twice
+    assert "(time = 0 to 1, 9, 72 s)" in describe_parted(study, "torque")[0]
 
 
 INPUT = Tolerance("lengths.input", 5e-5)
