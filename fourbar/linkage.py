@@ -418,7 +418,8 @@ class Bar(Described):
     centre : (r, phi), polar position of G from the bar's first pin (O2, A, O4), phi
         measured from the bar's line, m and rad; left out: mid-bar.
     density : kg/m^3, > 0, in place of `mass`, which is then that of a uniform bar from
-        pin to pin and follows the length.
+        pin to pin and follows the length: ``dataclasses.replace(bar, length=0.9,
+        mass=0)``.
     section : (height, thickness) of a rectangular cross-section, m: the height lies in
         the plane of motion.
     diameter : of a round cross-section, m, in place of `section`.
@@ -476,7 +477,8 @@ class Bar(Described):
             raise InputError(
                 "mass",
                 stated,
-                "must be left out: density or mass_per_length states it",
+                "must be left out (0 in dataclasses.replace): density or"
+                " mass_per_length states it",
             )
 
     @property

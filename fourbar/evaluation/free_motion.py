@@ -36,6 +36,7 @@ from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.quantities import NO_DIRECTION, Array
 from fourbar.scene import Command, ReleaseOrigin, Scene, command
+from fourbar.scene.scene import say_range
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
@@ -283,7 +284,8 @@ class _Run:
         case = Case.of_released(self.scene, bar, 0)
         if any(term.loaded_pins for term in case.terms):
             raise LimitError(
-                "a free motion cannot carry friction that depends on the pin forces"
+                "a free motion cannot carry friction that depends on the pin forces:"
+                " state effects.friction, constant torques, in place of pin_friction"
             )
         speed = float(self.scene.motion.speed or 0.0)
         theta: Any = start.angle.item()
@@ -291,7 +293,8 @@ class _Run:
         state = case.at(one)
         if not np.isfinite(state.position.u3):
             key = f"motion.theta_{bar}"
-            raise InputError(key, theta, "the linkage does not assemble there")
+            allowed = f"the linkage does not assemble there; {say_range(self.scene)}"
+            raise InputError(key, theta, allowed, unit="rad")
         for term in case.terms:
             codes = term.status(state, None)
             if codes is not None and np.any(codes == NO_DIRECTION):

@@ -665,12 +665,21 @@ def find_stroke_ranges(scene: Scene) -> list[tuple[float, float]]:
     return sorted(ranges)
 
 
-def write_stroke_ranges(scene: Scene) -> str:
-    """Write the ranges of `find_stroke_ranges`, or that there is none."""
-    ranges = find_stroke_ranges(scene)
-    if not ranges:
-        return f"none with motion.side = {scene.motion.side}"
-    return " and ".join(write_in_units("m", *ends, between=" to ") for ends in ranges)
+def say_range(scene: Scene) -> str:
+    """Say between which angles the commanded bar can be, or between which strokes."""
+    motion = scene.motion
+    if motion.commanded == "stroke":
+        strokes = " and ".join(
+            write_in_units("m", *ends, between=" to ")
+            for ends in find_stroke_ranges(scene)
+        )
+        none = f"none with motion.side = {motion.side}"
+        return f"this cylinder can have {strokes or none}"
+    ranges = [
+        f"{math.degrees(low):.9g} to {math.degrees(high):.9g} deg"
+        for low, high in find_intervals(scene.linkage, motion.bar)
+    ]
+    return f"theta_{motion.bar} goes from {' and from '.join(ranges)}"
 
 
 def command_at(scene: Scene, places: Array) -> Command:
@@ -683,8 +692,8 @@ def command_at(scene: Scene, places: Array) -> Command:
         most = triangle.length + triangle.reach
         outside = places[~((places >= least) & (places <= most))]
         if outside.size:
-            allowed = f"this cylinder can have {write_stroke_ranges(scene)}"
-            raise InputError("motion.stroke", float(outside[0]), allowed, unit="m")
+            stroke = float(outside[0])
+            raise InputError("motion.stroke", stroke, say_range(scene), unit="m")
         return command_stroke(scene, places, *motion.find_rates(places))
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:

@@ -12,7 +12,7 @@ from fourbar.formulas.mobility import TURN, find_intervals, turns_fully
 from fourbar.linkage import FourBar
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Sweep
-from fourbar.scene.scene import default_places, write_stroke_ranges
+from fourbar.scene.scene import default_places, say_range
 from fourbar.solving import solve
 
 COMMANDED_ANGLES = tuple(names[0] for names in COMMAND_NAMES.values())
@@ -52,18 +52,6 @@ def say_nowhere(scene: Scene) -> str:
         f"motion.{scene.motion.commanded}: the linkage assembles at none of the"
         f" positions requested; {say_range(scene)}"
     )
-
-
-def say_range(scene: Scene) -> str:
-    """Say between which angles the commanded bar can be, or between which strokes."""
-    motion = scene.motion
-    if motion.stroke is not None:
-        return f"this cylinder can have {write_stroke_ranges(scene)}"
-    ranges = [
-        f"{math.degrees(low):.9g} to {math.degrees(high):.9g} deg"
-        for low, high in find_intervals(scene.linkage, motion.bar)
-    ]
-    return f"theta_{motion.bar} goes from {' and from '.join(ranges)}"
 
 
 def extend_motion(scene: Scene) -> Scene:

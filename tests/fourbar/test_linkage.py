@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,11 @@ def test_density_and_cross_section_give_the_mass_of_a_uniform_bar():
     flat = Bar("0.4 m", density="7850 kg/m^3", section=("20 mm", "5 mm"))
     assert round_bar.mass == approx(7850.0 * math.pi * 0.01**2 * 0.4, rel=1e-15)
     assert flat.mass == approx(0.314, rel=1e-15)
-    assert Bar("0.66 m", mass_per_length="4.2 kg/m").mass == approx(2.772)
+    rod = Bar("0.66 m", mass_per_length="4.2 kg/m")
+    assert rod.mass == approx(2.772)
+    assert replace(rod, length=0.33, mass=0.0).mass == approx(1.386)
+    with raises(InputError, match=r"mass = 2\.772.*0 in dataclasses\.replace"):
+        replace(rod, length=0.33)
     assert flat.moment_of_inertia == approx(0.314 * 0.4**2 / 12.0, rel=1e-15)
 
 

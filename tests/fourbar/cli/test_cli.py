@@ -470,6 +470,11 @@ like "1 lb"
 lengths = { ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
 bars.coupler.mass = "1 in"
 ---
+motion.theta_2 = 99 deg: the linkage does not assemble there; theta_2 goes from -51.31
+lengths = { ground = "6 in", input = "2 in", coupler = "3 in", output = "2 in" }
+motion = { theta_2 = "99 deg", free = { duration = "1 s", steps = 9 } }
+bars.input.mass = "1 lb"
+---
 motion.stroke = 1 in: this cylinder can have 2 to 4 in
 lengths = { ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
 motion = { stroke = "1 in", side = "left", stroke_speed = "1 in/s" }

@@ -103,7 +103,7 @@ def test_jamming_is_a_status_and_leaves_no_force():
 def test_pin_load_friction_needs_the_pin_forces():
     motion = Motion(1.0, 0.0, free=Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
-    with raises(LimitError, match="pin forces"):
+    with raises(LimitError, match="pin forces: state effects"):
         solve(crank_rocker(motion=motion, effects=(friction,)))
 
 

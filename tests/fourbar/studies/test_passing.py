@@ -30,6 +30,7 @@ from fourbar.errors import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
+from fourbar.scene.scene import say_range
 from fourbar.show.located import locate
 from fourbar.studies.passing import (
     INSIDE_LIMIT,
@@ -37,7 +38,6 @@ from fourbar.studies.passing import (
     find_commanded,
     meet_limit,
     say_nowhere,
-    say_range,
 )
 from fourbar_validation.places import MODELS
 from tests.support.block import read_block
