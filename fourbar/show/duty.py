@@ -217,7 +217,9 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         numbers[f"rms_{name}"] = motion.find_rms(curve)
     largest = numbers[f"peak_{kind}"]
     if motion.start is not None and largest is not None:
-        numbers[f"peak_{kind}"] = max(largest, abs(motion.start.value))
+        at_rest = motion.solve_between()[drive.keys.value]
+        demand = np.where(np.isnan(motion.starts), at_rest, motion.starts)
+        numbers[f"peak_{kind}"] = float(np.nanmax(np.abs(demand)))
     fastest = motion.find_peak("speed")
     numbers["peak_speed"] = fastest and abs(fastest.value)
     closed = bool(is_once_round(solution)) and not motion.stretches

@@ -451,18 +451,19 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     assert said in block(held)
 
 
-@pytest.mark.parametrize("alpha", [30.0, -30.0])
+@pytest.mark.parametrize("alpha", [30.0, -0.1])
 @pytest.mark.parametrize("angle", [0.2, [0.2, 1.4]])
 def test_a_start_from_rest_works_against_the_whole_of_dry_friction(alpha, angle):
-    """Nothing holds it there: 0.5 N m at O2 act against the acceleration."""
+    """Nothing holds it there: 0.2 N m at O2 act against the acceleration."""
     still = Motion(angle, 0.0 * np.array(angle), np.full_like(angle, alpha))
     starts = solve(crank_rocker(motion=still, effects=WEIGHT)).torque
-    starts = starts + np.copysign(0.5, alpha)
+    starts = starts + np.copysign(0.2, alpha)
     largest = starts[np.abs(starts).argmax()]
-    scene = crank_rocker(motion=still, effects=(*WEIGHT, Friction.at(O2=0.5)))
+    scene = crank_rocker(motion=still, effects=(*WEIGHT, Friction.at(O2=0.2)))
     facts = Facts(solve(scene))
     start = facts.motion.start.value
     assert start == approx(largest, rel=1e-12)
+    # a brake is helped by friction
     assert len(starts) == 1 or facts.duty.peak_torque == abs(start)
     text = block(scene)
     assert "to start" in text and "holds" not in text
