@@ -87,8 +87,6 @@ def equilibria(question):
         signs = find_signs(scene.linkage, theta_2, question.at.branch[0])
         for branch, torque in torques.items():  # one assembly is a circuit of its own
             torque[signs != branch] = np.nan
-    if not any(np.any(torque[np.isfinite(torque)]) for torque in torques.values()):
-        raise NotAskedError("no position is held by a torque")
     judged = [
         (equilibrium, _judge_equilibrium(scene, equilibrium))
         for equilibrium in answer.found
@@ -151,8 +149,6 @@ def _list_samples(question):
     linkage = question.scene.linkage
     swept = solution.theta_2[solution.assembled]
     turn = 2.0 * math.pi
-    if not len(swept):
-        raise NotAskedError("the linkage assembles at none of its positions")
     first = swept[0]
     reached = []
     for start, stop in find_intervals(linkage):
@@ -179,10 +175,6 @@ def _hold(scene, angle, branch):
     command = Command(angle, np.full(angle.shape, branch, dtype=np.int8), 0.0, 0.0)
     with np.errstate(all="ignore"):
         answer = FreeBody().answer(scene, command)
-        if answer.refusal is not None:
-            raise NotAskedError(answer.refusal)
-        if "torque" not in answer.quantities:  # no position assembles
-            return np.full(angle.shape, np.nan)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
     sound = answer.assembled & (np.abs(sine) >= WELL_CONDITIONED)
     return np.where(sound, answer.quantities["torque"], np.nan)

@@ -22,6 +22,7 @@ from fourbar.solving import solve
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.rows import REFUSES, Row, keep_worst
 from fourbar_validation.compare.tolerance import EPS, K
+from fourbar_validation.run.question import NotAskedError
 from tests.oracle.variants import ask_free_bodies, at_places, hold_to, take_few
 
 NUMBER_IN_A_FILE = r"[-+.\deE]+"
@@ -68,6 +69,8 @@ def _judge_file(question, engine, read):
 
     Loads are what a simulator adds.
     """
+    if question.at.commanded != "theta_2":
+        raise NotAskedError(f"{question.at.commanded} is commanded")
     # a drive at a named point keeps its place without the point
     few = state_from_pins(take_few(question))
     scene = replace(few, loads=(), points=())
@@ -143,10 +146,8 @@ def _read_sdf(text):
 
 def _read_usd(text):
     def numbers(block, key):
-        match = re.search(rf"{re.escape(key)} = (.*)", block)
-        if match:
-            return [float(number) for number in re.findall(NUMBER_IN_A_FILE, match[1])]
-        return [math.nan] * 4
+        stated = re.search(rf"{re.escape(key)} = (.*)", block)[1]
+        return [float(number) for number in re.findall(NUMBER_IN_A_FILE, stated)]
 
     def turn(block, key):
         w, _, _, z = numbers(block, key)

@@ -12,36 +12,20 @@ from tests.oracle.points import points
 from tests.oracle.sensitivities import sensitivity, study, tolerances
 from tests.oracle.summary import summary
 
-OF_FORCES = (
-    study,
-    sensitivity,
-    tolerances,
-    internal_forces,
-    summary,
-    equilibria,
-    sdf,
-    usd,
-)
-"""Oracles that need the forces of the free bodies."""
-ORACLES = {oracle.__name__: oracle for oracle in (points, *OF_FORCES)}
-AT_THETA_2 = (sdf, usd)
-"""Oracles that need a command of theta_2."""
-
-
-def ask(oracle, question):
-    """Yield the rows of an oracle.
-
-    Raises NotAskedError where the scene has nothing that it could compare.
-    """
-    if question.at.speed is None and oracle is not equilibria:
-        raise NotAskedError("the scene has no speed")
-    if oracle in AT_THETA_2 and question.at.commanded != "theta_2":
-        raise NotAskedError(f"{question.at.commanded} is commanded")
-    if oracle in OF_FORCES and oracle is not equilibria:
-        answer = question.free_body
-        if answer is None or answer.refusal is not None:
-            raise NotAskedError("the free bodies have no forces for this scene")
-    yield from oracle(question)
+ORACLES = {
+    oracle.__name__: oracle
+    for oracle in (
+        points,
+        study,
+        sensitivity,
+        tolerances,
+        internal_forces,
+        summary,
+        equilibria,
+        sdf,
+        usd,
+    )
+}
 
 
 def judge_by(scene, *names):
@@ -55,7 +39,7 @@ def judge_by(scene, *names):
     rows = []
     for name in names or ORACLES:
         try:
-            rows += ask(ORACLES[name], question)
+            rows += ORACLES[name](question)
         except NotAskedError:
             if names:
                 raise

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 import tomlkit
 
-from fourbar.errors import InputError
 from fourbar.files import dump, loads
 from fourbar.linkage import BAR_NUMBERS, ENDS, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import LINE, OK, SCALARS, UNKNOWNS
@@ -45,10 +44,6 @@ a number reverse it then.
 """
 MISS_OF_A_CHANGE_POINT = 1e-3
 """Part of the sum of the lengths by which a linkage near a change point misses it."""
-PERTURBATION_TRIED = 5e-4
-"""Part of the squared sum of the lengths. Changed linkages keep to the nominal assembly
-if they miss its change point by less than twice as much. See `_measure_misses`.
-"""
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
@@ -182,8 +177,6 @@ class SceneFile:
         """Read the file after some of its numbers were changed by so much.
 
         motion.theta_2 moves every position.
-
-        Raises NotAskedError where the changed linkage can never assemble.
         """
         drawn = any(map(is_coordinate, changes))
         document = deepcopy(self._by_pins if drawn else self._by_lengths)
@@ -198,12 +191,7 @@ class SceneFile:
             table[last] = _change_entry(table[last], change)
         if drawn:
             self._keep_on_ground(document, document["pins"])
-        try:
-            return loads(tomlkit.dumps(document))
-        except InputError as refused:
-            if refused.key != "lengths":
-                raise
-            raise NotAskedError("a changed linkage can never assemble") from refused
+        return loads(tomlkit.dumps(document))
 
     def _keep_on_ground(self, document, pins):
         """Let the places on the ground stay in the drawing while its pins move."""
@@ -249,29 +237,6 @@ def is_near_change_point(linkage):
     differences = d + a - b - c, d + b - a - c, d + c - a - b
     least = min(map(abs, differences))
     return least <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
-
-
-def _measure_misses(linkage, bar):
-    """Measure by how much change points are missed at the ends of the diagonal's range.
-
-    With the bar commanded, the diagonal is at least |d - r| and at most d + r, where r
-    is its length; the other two bars, m and n, are in line where the diagonal is m + n
-    or |m - n|. The miss is the difference of the squares over the square of the sum.
-    """
-    d = linkage.ground
-    lengths = [linkage.bar(number).length for number in MOVING_BARS]
-    r = lengths.pop(bar - 2)
-    m, n = lengths
-    misses = np.array([(d - r) ** 2 - (m - n) ** 2, (d + r) ** 2 - (m + n) ** 2])
-    return np.abs(misses) / sum_lengths(linkage) ** 2
-
-
-def stays_beside(member, scene):
-    """Return whether a member misses by little each change point that the scene has."""
-    bar = scene.motion.bar
-    nominal = _measure_misses(scene.linkage, bar)
-    changed = _measure_misses(member.linkage, bar)
-    return np.all(changed[nominal <= PERTURBATION_TRIED] <= PERTURBATION_TRIED)
 
 
 def ask_beside(member, scene, nominal):
