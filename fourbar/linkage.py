@@ -166,6 +166,10 @@ class Declared(NamedTuple):
     always: bool = False
     """True if a scene file must state it, although its field has a default."""
 
+    def __repr__(self) -> str:
+        """Write the unit, for `help`."""
+        return repr(self.unit)
+
     @property
     def units(self) -> tuple[str, str]:
         """Units of both numbers of a pair."""

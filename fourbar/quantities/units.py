@@ -96,7 +96,7 @@ def to_si(text: str, unit: str) -> float:
     Raises UnitError where the text has no number, no unit, an unknown unit, or a unit
     of another dimension than `unit`, and where the number does not fit into a double.
     """
-    text = text.strip()
+    text = _strip(text)
     feet = _FEET.match(text)
     text = text[feet.end() :] if feet else text
     number_text = _FRACTION.match(text) or NUMBER_TEXT.match(text)
@@ -153,6 +153,11 @@ def write_pint_quantity(quantity: Any) -> Any:
     return f"{numbers!r} {unit}"
 
 
+def _strip(text: object) -> str:
+    """Return a text without space around it, and the minus sign as a hyphen."""
+    return str(text).strip().replace("−", "-")
+
+
 def _read_fraction(text: re.Match[str]) -> Fraction:
     """Return the number that `NUMBER_TEXT` or `_FRACTION` matched."""
     if text.re is NUMBER_TEXT:
@@ -164,7 +169,7 @@ def _read_fraction(text: re.Match[str]) -> Fraction:
 
 def find_unit(text: object, otherwise: str) -> str:
     """Return the unit that a text has; another one where it has none."""
-    last = _FEET.sub("", str(text).strip())  # the inches of 1'6"
+    last = _FEET.sub("", _strip(text))  # the inches of 1'6"
     number_text = _FRACTION.match(last) or NUMBER_TEXT.match(last)
     unit = last[number_text.end() :].strip() if number_text else ""
     unit = re.sub('[″”"]', "in", re.sub("[′’']", "ft", unit))
@@ -176,7 +181,7 @@ def half_unit_of_text(text: object, unit: str) -> float:
 
     A number without decimals gives 0.
     """
-    last = _FEET.sub("", str(text).strip())
+    last = _FEET.sub("", _strip(text))
     number_text = None if _FRACTION.match(last) else NUMBER_TEXT.match(last)
     if number_text is None:
         return 0.0

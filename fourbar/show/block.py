@@ -455,7 +455,8 @@ class SceneBlock(Facts):
         assert drive is not None
         if self.peak is None:
             return self._write_growth(drive.keys.value)
-        peak = self._value(self._without_rounding(self.peak.value), drive.unit)
+        largest = self._without_rounding(self.peak.value)
+        peak = self._value(largest, drive.unit)
         if self.duty is None:
             return peak
         row = f"peak {peak} at {self._place(self.peak.place)}{self._of_positions}"
@@ -463,7 +464,7 @@ class SceneBlock(Facts):
         if rms is None:
             return row
         rms = self._without_rounding(rms)
-        mean = self._value(rms, drive.unit, self.peak.value, FAR_BELOW_PEAK)
+        mean = self._value(rms, drive.unit, largest, FAR_BELOW_PEAK)
         return f"{row}, RMS {mean}"
 
     def _write_growth(self, name: str) -> str:

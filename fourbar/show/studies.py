@@ -71,7 +71,7 @@ def write_type(
     factor, unit = choose_unit(max(linkage.lengths), "m", units)
 
     def write(length: float) -> str:
-        return f"{factor * length:.6g} {unit}".rstrip()
+        return f"{factor * length:.9g} {unit}".rstrip()
 
     inner = sum(linkage.lengths) - outer
     turning = ", ".join(BAR_NAMES[number] for number in mobility.turning)
@@ -134,7 +134,7 @@ def _write_mobility(linkage: FourBar, everything: bool) -> Iterator[str]:
         others = ", ".join(BAR_NAMES[other] for other in MOVING_BARS if other != bar)
         how = "stretched" if limit.stretched else "folded"
         what = f"  {BAR_NAMES[bar]}: {others} {how}"
-        angles = "".join(f"{math.degrees(angle):10.4f}" for angle in limit[:3])
+        angles = "".join(f"{math.degrees(angle):z10.4f}" for angle in limit[:3])
         yield f"{what:<34}{angles}  {BRANCH_NAMES.get(limit.branch, 'both')}"
     if points := change_points(linkage):
         yield f"change points: theta_2 = {' and '.join(map(_write_angle, points))}"

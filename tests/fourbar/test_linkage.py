@@ -1,6 +1,7 @@
 import json
 import math
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -39,6 +40,10 @@ def test_the_section_modulus_is_that_of_the_second_moment_of_area():
         assert bar.section_modulus == approx(second_moment / 0.01, rel=1e-6)
         assert bar.area == approx(np.trapezoid(widths, y), rel=1e-6)
     assert Bar(1.0).section_modulus is None
+
+
+def test_the_signature_has_the_units():
+    assert "Annotated[float, 'kg'] = 0.0" in str(signature(Bar))
 
 
 @pytest.mark.parametrize(

@@ -256,6 +256,8 @@ CLASSIFIED = read_rows("""
 # at its limits the input is the corner of 80, 100 and 90 + 50, or 90 - 50 mm
 80mm 100mm 50mm 90mm | input: coupler, output folded      22.3316
 80mm 100mm 50mm 90mm | input: coupler, output stretched  101.5370
+3 1 3 1.0000001 | s + l = 4 < p + q = 4.0000001
+3 1 3 1.000000000001 | folded     180.0000    0.0000 -179.9999  crossed
 3/2 1/2 1 9/8 | s + l = 2 < p + q = 2.125
 2 1 2 1 | change points: theta_2 = 0.0000 deg and 180.0000 deg
 """)

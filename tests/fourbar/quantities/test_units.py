@@ -127,7 +127,7 @@ OF_NAMES += [
     ("degree deg °", "rad", PI / 180),
     ("gradian grad gon", "rad", PI / 200),
     ("revolution rev turn r", "rad", 2 * PI),
-    ("rpm", "rad/s", 2 * PI / 60),
+    ("rpm RPM", "rad/s", 2 * PI / 60),
     ("rps", "rad/s", 2 * PI),
     ("slug", "kg", LBF / FOOT),
     ("blob", "kg", 12 * LBF / FOOT),
@@ -187,6 +187,7 @@ CONVERTED = read_rows("""
 -1 1/2 in | m | -0.0381
 -1-1/2 in | m | -0.0381
 -3/8 in | m | -0.009525
+−40 mm | m | -0.04
 +3/8 in | m | 0.009525
 """)
 """A foot is 0.3048 m."""
@@ -275,7 +276,7 @@ def test_a_force_is_not_taken_for_a_length():
     "text, half",
     read_rows("""
 0.10 m | 5e-3
-12.5 mm | 5e-5
+−12.5 mm | 5e-5
 1.00e-2 m | 5e-5
 1.5e+1 mm | 5e-4
 3 m | 0

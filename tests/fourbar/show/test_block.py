@@ -22,6 +22,7 @@ from fourbar import (
     Motion,
     PinFriction,
     Place,
+    PointDrive,
     Rise,
     Scene,
     Sine,
@@ -364,6 +365,16 @@ SAID = {
         balanced_lamp(0.0),
         [" torque peak 0 N m at ", "RMS 0 N m", "the torque is zero within rounding"],
         "without bound|motor|some digits|nN",
+    ),
+    "a lamp that a spring balances, upheld at its end": (
+        replace(
+            balanced_lamp(0.0),
+            drive_bar=None,
+            drive=PointDrive(Place(2, (0.3, 0.0)), 0.5 * pi),
+            motion=Motion(Sweep(radians(10.0), radians(150.0), 10), 0.0),
+        ),
+        ["force peak 0 N at theta_2 = 89.97 deg, RMS 0 N "],
+        "nN",
     ),
 }
 """The same of scenes built in code."""
