@@ -25,7 +25,7 @@ from fourbar.quantities import (
 from fourbar.show.acting import list_arm_notes
 from fourbar.show.columns import Column, list_column_quantities, read_column
 from fourbar.show.derived import list_derived_names
-from fourbar.show.driving import read_drive_demand
+from fourbar.show.driving import leaves_range, read_drive_demand
 from fourbar.show.lines import wrap_line
 from fourbar.show.shown_units import drop_rounding, write_cell
 from fourbar.solution import (
@@ -208,7 +208,10 @@ def _list_names(solution: Solution) -> Iterator[str]:
     A vector has its components, and a force its size first; a pin force has that alone.
     """
     scene = solution.scene
-    names = ["theta_2", COUPLE.value, LINE.value, "power", *PIN_FORCES]
+    names = ["theta_2", COUPLE.value, LINE.value]
+    if leaves_range(solution).any():
+        names += read_drive_demand(solution).keys[2:]
+    names += ["power", *PIN_FORCES]
     names += solution.points
     names += [f"v_{name}" for name in solution.velocity]
     names += [f"a_{name}" for name in solution.acceleration]

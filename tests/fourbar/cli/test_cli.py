@@ -38,7 +38,7 @@ from fourbar.mjcf.document import write_mjcf_for
 from fourbar.show import tables
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import balance, crank_rocker, find_angle
+from tests.support.scenes import RESTING, balance, crank_rocker, find_angle
 from tests.support.shares import slow_but
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
@@ -213,6 +213,12 @@ def test_a_table_over_time_has_the_drive_of_a_law_and_none_of_a_release():
     names = [heading.split("\n")[0] for heading in law]
     assert names[:4] == ["time", "theta_2", "T2", "power"]
     assert not {"T2\nN m", "power\nW"} & released.keys()
+
+
+def test_a_table_has_the_range_that_dry_friction_at_rest_leaves_the_drive():
+    _, *drive = tables.list_columns(solve(RESTING)).values()
+    shown, low, high = (float(*cells) for cells in drive[:3])
+    assert [shown - low, high - shown] == approx([0.2, 0.2])
 
 
 def test_the_digits_of_the_torque():
