@@ -16,7 +16,7 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.show.columns import read_column
 from fourbar.show.derived import list_point_names
-from fourbar.show.driving import read_drive_demand
+from fourbar.show.driving import leaves_range, read_drive_demand
 from fourbar.show.duty import compute_energies
 from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.style import (
@@ -270,14 +270,11 @@ def list_demand(view: View) -> Chart:
     drive = read_drive_demand(view.sweep)
     what = "Torque" if view.scene.drive is None else "Force"
     chart = _list_drive(drive.keys.value, drive.symbol[0], what, view)
-    for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
-        held = getattr(view.sweep, end)
-        if held is None:
-            break
-        apart = np.abs(held - drive.values) > 0.0
-        if np.any(apart[1:] & apart[:-1]):  # one position alone is no line
-            look = {"color": MUTED, "ls": "--"}
-            chart.curves[label] = np.where(apart, held, np.nan), look
+    rests = leaves_range(view.sweep)
+    if np.any(rests[1:] & rests[:-1]):  # one position alone is no line
+        look = {"color": MUTED, "ls": "--"}
+        for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
+            chart.curves[label] = np.where(rests, view.sweep[end], np.nan), look
     return chart
 
 

@@ -201,9 +201,9 @@ class View:
         text = "Dry friction at rest is taken as 0"
         if len(solution) == 1:
             drive = read_drive_demand(solution)
-            ends = [float(solution[end][0]) for end in drive.keys[2:]]
             low, high = (
-                write_labelled_quantity(end, drive.unit, self.units) for end in ends
+                write_labelled_quantity(solution[end][0], drive.unit, self.units)
+                for end in drive.keys[2:]
             )
             text += f"; with it the {drive.name} is between {low} and {high}"
         self.note(f"{text}.")
