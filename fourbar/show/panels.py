@@ -306,7 +306,10 @@ class Panels:
         may_exceed = smooth & ~is_flat & (best + excess >= best.max() - TIED * scale)
         for row in np.flatnonzero(may_exceed):
             x[row], values[row] = _find_extreme(curve.series[row], rank)
-        ranks = np.where(np.isfinite(values), rank(values), -np.inf)
+        # the polynomial of a panel that was not settled may exceed the curve
+        unsure = smooth & (curve.error > EXTREME_ERROR * scale)
+        certain = rank(values) - np.where(unsure, curve.error, 0.0)
+        ranks = np.where(np.isfinite(values), certain, -np.inf)
         first = int(np.argmax(ranks >= ranks.max() - TIED * scale))
         for after in range(first + 1, len(ranks)):
             rise = ranks[after] - ranks[first]

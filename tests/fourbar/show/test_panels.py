@@ -86,3 +86,15 @@ ZEROS = [0.3, 0.8, 1.7]
 )
 def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, edges):
     assert fit(curve, edges, "zeros").find_zeros("curve") == approx(zeros, abs=1e-9)
+
+
+@pytest.mark.parametrize("frequency", (400.0, 800.0))
+def test_a_panel_that_is_not_settled_exceeds_no_peak(frequency):
+    """Of many equal peaks the settled ones are right to a part of 1e-9."""
+
+    def compute(places):
+        return {"curve": np.exp(0.5 * np.sin(frequency * places))}
+
+    edges = np.linspace(0.0, 0.7, 13)
+    panels = fit_panels(compute, edges, {"curve": Wanted(ranged=True)})
+    assert panels.find_peak("curve").value == approx(exp(0.5), rel=SETTLED)
