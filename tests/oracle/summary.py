@@ -43,6 +43,8 @@ acts there makes a jump.
 """
 PEAK_INTERVALS = 1440
 """Intervals between two edges at whose ends nothing may exceed a peak or a range."""
+MOST_INTERVALS = 20 * PEAK_INTERVALS
+"""Intervals of a whole motion, of which a fast sine has hundreds of swings."""
 EXCESS_BETWEEN_POSITIONS = 1e-3
 """Part by which a largest value without a place may exceed that of many positions. Its
 own position lies between two of them.
@@ -123,8 +125,9 @@ class _SummaryJudge:
     @cached_property
     def fine_places(self):
         """Return many places between the scene's own, the closest beside the edges."""
-        graded = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, PEAK_INTERVALS + 1))
-        pieces = [low + (high - low) * graded for low, high in pairwise(self.edges)]
+        intervals = min(PEAK_INTERVALS, MOST_INTERVALS // (len(self.swings) - 1))
+        graded = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, intervals + 1))
+        pieces = [low + (high - low) * graded for low, high in pairwise(self.swings)]
         return np.unique(np.concatenate(pieces))
 
     def integrates(self, name):
@@ -236,7 +239,7 @@ def summary(question):
         error = np.array(errors)
         tolerance = LOCATED_ROUGHLY if name == "bending" else PRINTED
         nowhere = np.full(len(errors), math.nan)
-        reason = f"{len(errors)} numbers, {PEAK_INTERVALS + 1} positions"
+        reason = f"{len(errors)} numbers, {len(judged.fine_places)} positions"
         yield make_row(question, "summary", name, error, tolerance, nowhere, reason)
 
 
