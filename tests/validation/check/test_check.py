@@ -812,6 +812,8 @@ theta_2,torque\n1,2,3\n | needs 2 cells; with decimal commas, semicolons
 theta_2,torque\nrad,kg\n1,2\n | kg
 theta_2,torque_low\n1,2\n | no dry friction
 theta_2,drive_force\n1,2\n | its drive exerts a torque
+theta_2,stroke\n1,2\n | it has no cylinder
+time,Zeit,torque\n0,0,1\n | columns 1 and 2 are both time
 theta_2,wheel\n1,2\n | known are the columns of
 theta_2,torque [kg]\n1,2\n | kg
 theta_2,torque,torque\n1,2,3\n | columns 2 and 3 are both torque: rename
@@ -1086,7 +1088,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     assert note.startswith(words)
 
 
-@pytest.mark.parametrize("heading", ["omega", "R12x [N]", "pin O2 [N]"])
+@pytest.mark.parametrize("heading", ["omega", "R12x [N]", "F12 / F32"])
 def test_a_column_of_an_unknown_name_is_left_out_by_name(heading, torques):
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
     ((name, why),) = table.left_out.items()

@@ -1,4 +1,4 @@
-"""Parts of the report from elsewhere: the hard cases, and what accuracy costs."""
+"""Parts of the report besides the scenes: hard cases by family, limits and links."""
 
 import re
 

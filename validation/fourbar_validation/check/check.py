@@ -289,14 +289,15 @@ def check_command(
     by its levels of accuracy.
 
     Columns are named as by `fourbar analyze --csv`, whose file is read as it is; a unit
-    may follow in brackets: theta_2 [deg], torque [lbf ft], F12_x, F12_y, F43 [kN] (a
-    magnitude). A spreadsheet's semicolons, blank cells, thousands separators and lines
-    of comments are understood. Half a unit of the last printed digit is allowed; the
-    command prints to how many digits the numbers were compared. If --rtol or --atol is
-    given, these decide, and the number of exact agreements is printed too. If the scene
-    states no speed, each row is judged at its own, say omega_2 and alpha_2. Along a law
-    each has the law's at its time, a column beside or without the angle, or its own; at
-    one speed a row without an angle is found by its time.
+    may follow in brackets or after " / ": theta_2 [deg], torque [lbf ft], F12_x, F12_y,
+    F43 [kN] (a magnitude). A spreadsheet's semicolons, blank cells, thousands
+    separators and lines of comments are understood. Half a unit of the last printed
+    digit is allowed; the command prints to how many digits the numbers were compared.
+    If --rtol or --atol is given, these decide, and the number of exact agreements is
+    printed too. If the scene states no speed, each row is judged at its own, say
+    omega_2 and alpha_2. Along a law each has the law's at its time, a column beside or
+    without the angle, or its own; at one speed a row without an angle is found by its
+    time.
 
     A row is found by what the scene commands (theta_2, theta_3, theta_4 or a stroke).
     In its place the angle of another bar may stand, if the motion passes it once or the

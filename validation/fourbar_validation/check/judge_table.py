@@ -131,6 +131,8 @@ class JudgedColumn:
             raise InputError(rate, None, needed)
         exerts = "torque" if self.judge.drive is COUPLE else "force"
         why = f"its drive exerts a {exerts}"
+        if self.quantity == "stroke":
+            why = "it has no cylinder"
         if self.quantity in self.judge.drive:
             why = "it has no dry friction"
         missing = f"does not exist in this scene: {why}"

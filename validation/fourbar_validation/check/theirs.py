@@ -265,7 +265,7 @@ def _read_columns(
         times = None
     notes: tuple[str, ...] = ()
     if place.unit.text == "rad" and not re.search(
-        r"[\[(]", headings[found[found_by][0]]
+        r"[\[(]|/ ", headings[found[found_by][0]]
     ):
         place, notes = _read_degrees(found_by, place)
     read_columns: dict[str, TheirColumn] = {}
@@ -292,6 +292,7 @@ def _find_columns(
     """Return place and unit of the columns that are read, and why others are not."""
     left_out: dict[str, str] = {}
     found: dict[str, tuple[int, Unit]] = {}
+    repeated: dict[str, str] = {}
     for index, heading in enumerate(headings):
         stated = "".join(unit_line[index : index + 1]).strip(" []()")
         name, unit, why = _read_heading(heading, stated, commanded, points)
@@ -299,13 +300,17 @@ def _find_columns(
             continue  # an empty cell that a spreadsheet leaves at the end of a line
         if why:
             left_out[heading.strip() or f"column {index + 1}"] = why
-        again = name in found
-        if unit is None or (again and name == "time"):
-            continue  # of several columns of times the first is read
-        if again:
+        if unit is None:
+            continue
+        if name in found:
             both = f"columns {found[name][0] + 1} and {index + 1} are both {name}"
-            raise InputError("header", headings, f"{both}: rename or remove one")
+            repeated.setdefault(name, f"{both}: rename or remove one")
+            continue
         found[name] = index, unit
+    if found.keys() & {commanded, *_PLACES}:
+        repeated.pop("time", None)  # beside an angle the first is read
+    for why in repeated.values():
+        raise InputError("header", headings, why)
     return found, left_out
 
 
@@ -540,7 +545,12 @@ def _read_heading(
     if match is None or not _is_known(name, points):
         return name, None, f"not a known column: {_KNOWN}"
     key = f"|{name}|" if name == vector else name
-    return key, _read_unit(heading, quantity, unit), ""
+    try:
+        return key, _read_unit(heading, quantity, unit), ""
+    except InputError:
+        if match["slash"] is None:
+            raise
+        return name, None, f"not a known column: {_KNOWN}"  # a ratio
 
 
 def _read_unit(heading: str, quantity: str, text: str) -> Unit:

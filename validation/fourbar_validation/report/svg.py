@@ -104,7 +104,8 @@ def set_frame(axes: Any) -> None:
 def write_svg(figure: Any, salt: str, **paper: Any) -> str:
     """Draw the figure, small, to stand in a page.
 
-    `salt`: keeps the ids of two figures in one page apart. `paper`: what lies beneath
+    `salt`: keeps the ids of two figures in one page apart; a copy of a figure has the
+    same ids, of the same things. `paper`: what lies beneath
     it, as matplotlib's `savefig` takes it; left out: the page.
     """
     import matplotlib

@@ -60,7 +60,7 @@ def _restate_table(law: Law, time: Array) -> _Restated:
     t = np.array(law.time)
     steps = np.diff(t)
     shortest = float(steps.min())
-    longest = float(steps.max())
+    span = float(steps.max())
     columns = [x for x in (law.angle, law.omega, law.alpha) if x is not None]
     rates = np.zeros((3, len(time)))
     if law.omega is None:
@@ -75,7 +75,7 @@ def _restate_table(law: Law, time: Array) -> _Restated:
         rates += [curve(time, order) for order in range(3)]
         rates[:2] += mean * time, np.full(len(time), mean)
     else:
-        longest = t[-1] - t[0]
+        span = t[-1] - t[0]
         reason = "the polynomial through angles and rates, piece by piece"
         piece = np.clip(np.searchsorted(t, time, side="right") - 1, 0, len(steps) - 1)
         for number in range(len(steps)):
@@ -87,7 +87,8 @@ def _restate_table(law: Law, time: Array) -> _Restated:
     # a table of uneven steps overshoots its points
     sizes = [np.abs(rates[0]).max()]
     sizes += [np.abs(x).max() * steps.max() ** k for k, x in enumerate(columns)]
-    size = sum(sizes) * longest / shortest
+    # over which what is fitted together is rounded: a spline by its steps, pieces alone
+    size = sum(sizes) * span / shortest
     return _Restated(rates, size, shortest, reason)
 
 
