@@ -52,17 +52,21 @@ CHANGE_POINT = """
   <default><geom type="capsule" size="0.1" contype="0" conaffinity="0"/></default>
   <worldbody>
     <body name="crank"><joint name="motor" axis="0 1 0"/>
-      <geom fromto="0 0 0 1.00001 0 0"/>
-      <body name="rod" pos="1.00001 0 0"><joint name="A" axis="0 1 0"/>
-        <geom fromto="0 0 0 2.00001 0 0"/><site name="end" pos="2.00001 0 0"/></body>
+      <geom fromto="0 0 0 {a} 0 0"/>
+      <body name="rod" pos="{a} 0 0"><joint name="A" axis="0 1 0"/>
+        <geom fromto="0 0 0 {b} 0 0"/><site name="end" pos="{b} 0 0"/></body>
     </body>
-    <body name="output" pos="4 0 0"><joint name="O4" axis="0 1 0"/>
-      <geom fromto="0 0 0 -3.00001 0 0"/><site name="top" pos="-3.00001 0 0"/></body>
+    <body name="output" pos="{d} 0 0"><joint name="O4" axis="0 1 0"/>
+      <geom fromto="0 0 0 -{c} 0 0"/><site name="top" pos="-{c} 0 0"/></body>
   </worldbody>
   <equality><connect name="B" site1="end" site2="top"/></equality>
   <actuator><motor joint="motor"/></actuator>
 </mujoco>
 """
+
+
+def write_change_point(d, a, b, c):
+    return CHANGE_POINT.format(d=d, a=a, b=b, c=c)
 
 
 def list_equal(made):
@@ -187,6 +191,21 @@ def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
 
 def test_one_equality_alone_is_met_by_chance():
     """The sum d + a is b + c but for 1e-5: less than three roundings of 5e-6."""
-    made = read_scene(CHANGE_POINT)
+    lengths = (4.0, 1.00001, 2.00001, 3.00001)
+    made = read_scene(write_change_point(*lengths))
     assert not list_equal(made)
-    assert made.scene.linkage.lengths == approx((4.0, 1.00001, 2.00001, 3.00001))
+    assert made.scene.linkage.lengths == approx(lengths)
+
+
+def test_round_off_of_the_compiler_takes_no_change_point_away():
+    """Beyond it the bars that follow are on the other sides of each other."""
+    text = write_change_point(0.4, 0.1, 0.2, 0.30000000000003)
+    posed, _ = pose_loop(text)
+    made = read_scene(text)
+    assert not list_equal(made)
+    assert made.loop.rounding == 0.0
+    inside = LoopInside(posed.model, made.loop)
+    in_line = made.loop.angles[0] + math.pi
+    poses = [inside.close(in_line + away) for away in (-0.3, 0.3)]
+    before, after = map(inside.measure_sine, poses)
+    assert before == approx(-after)

@@ -31,6 +31,10 @@ FLAT = 2e-3
 is: a loop that is closed to 1e-12 m leaves about half as much open where its bars are
 in line.
 """
+DIGITS_OF_A_MODEL = 12
+"""Significant digits of a number of the scene. Those beyond are round-off of the
+compiler.
+"""
 SETTINGS_OF_AN_SDF = (
     "an SDF or a URDF states neither softness nor solver: MuJoCo's defaults act, and"
     " only an MJCF of the robot can state others"
@@ -114,8 +118,9 @@ class RobotLoop:
     """Why its driven hinge is taken, where neither a motor nor an option tells."""
     remarks: tuple[str, ...] = ()
     read_lengths: tuple[float, ...] = ()
-    """Lengths of its scene, m; empty where they are its own. They differ where the
-    digits of the file cannot tell the linkage from one with a change point.
+    """Lengths of its scene, m; empty where they are its own without round-off. They
+    differ where the digits of the file cannot tell the linkage from one with a change
+    point.
     """
 
     turned: float = 0.0
@@ -141,12 +146,16 @@ class RobotLoop:
     @property
     def met(self) -> tuple[float, ...]:
         """Lengths of ground, input, coupler and output as they are read, m."""
-        return self.read_lengths or self.lengths
+        return self.read_lengths or tuple(map(round_off, self.lengths))
 
     @property
     def rounding(self) -> float:
-        """Sum by which the lengths that are read differ from its own, m."""
-        return sum(abs(x - y) for x, y in zip(self.met, self.lengths, strict=True))
+        """Sum by which the lengths that are read differ from its own, m.
+
+        The round-off of the compiler is no part of it.
+        """
+        own = map(round_off, self.lengths)
+        return sum(abs(x - y) for x, y in zip(self.met, own, strict=True))
 
     @property
     def longest(self) -> float:
@@ -216,6 +225,11 @@ class LoopScene:
     """Sentences on what was chosen, and on what the scene leaves out, with its size."""
     notes: tuple[str, ...]
     """Sentences on what was done to the file and its pose."""
+
+
+def round_off(number: float) -> float:
+    """Round to the digits that a compiled model has."""
+    return float(f"{number:.{DIGITS_OF_A_MODEL}g}")
 
 
 def is_in_line(angles: Sequence[float], bar: int) -> bool:

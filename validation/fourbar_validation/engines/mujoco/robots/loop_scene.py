@@ -55,6 +55,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     RobotFile,
     RobotLoop,
     is_in_line,
+    round_off,
 )
 from fourbar_validation.engines.mujoco.robots.pose import (
     OUTSIDE_A_RANGE,
@@ -65,10 +66,6 @@ from fourbar_validation.engines.mujoco.robots.pose import (
 )
 from fourbar_validation.engines.mujoco.robots.seen import Lump, SeenLoop
 
-DIGITS_OF_A_MODEL = 12
-"""Significant digits of a number of the scene. Those beyond are round-off of the
-compiler.
-"""
 _DECIMALS_OF_A_DEGREE = 10
 """The same for an angle in degrees."""
 SWEEP_INTERVALS = 120
@@ -168,11 +165,6 @@ def write_pose(
         angle = math.degrees(qpos[model.jnt_qposadr[joint]])
         parts.append(f"{name_joint(model, joint)}={round(angle, 6):.10g}deg")
     return ",".join(parts)
-
-
-def round_off(number: float) -> float:
-    """Round to the digits that a compiled model has."""
-    return float(f"{number:.{DIGITS_OF_A_MODEL}g}")
 
 
 def _round_angle(angle: float) -> float:
@@ -310,19 +302,19 @@ class SceneOfLoop(SeenLoop):
         a scene that states rounded lengths or coordinates, the lengths are those of the
         parallelogram or kite that the digits cannot tell from the file's.
         """
-        d, a, b, c = map(round_off, self.loop.lengths)
+        d, a, b, c = self.loop.met
         stated = (d, a, b, c)
         met = tuple(map(round_off, self._meet_lengths(stated)))
         equal = [
             f"{first} and {second}, which differ by {gap:.4g} m"
             for first, second, gap in list_met_equalities(stated, met)
         ]
-        if equal and met != stated:
+        if equal:
             self.remarks.append(
                 "lengths read as equal within the digits of the file:"
                 f" {'; '.join(equal)}"
             )
-            self.loop = replace(self.loop, read_lengths=met)
+        self.loop = replace(self.loop, read_lengths=met)
         return met
 
     def _meet_lengths(self, lengths: Lengths) -> Lengths:
