@@ -310,7 +310,7 @@ STATED["ball constraint of a URDF"] = write_urdf(
     f'<drake:ball_constraint_p_AP value="{B} 0 0"/>'
     '<drake:ball_constraint_body_B name="rocker"/>'
     f'<drake:ball_constraint_p_BQ value="{C} 0 0"/></drake:ball_constraint>'
-)
+).replace("<robot", '<robot xmlns="http://drake.mit.edu"')
 STATED["two frames of each joint"] = write_drake()
 STATED["weld constraint"] = write_halves()
 ROD_MODEL = f"""<sdf version="1.9"><model name="rod"><pose>9 9 9 0 0 0</pose>

@@ -20,6 +20,8 @@ _DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
 """Comments, declarations and control characters, which MuJoCo's reader lets stand
 anywhere.
 """
+_NAMESPACE = r"""\sxmlns\s*=\s*("[^"]*"|'[^']*')"""
+"""Namespace of all elements. Simulators take it for an attribute."""
 _PREFIX = r"[<\s](?!xml)([a-zA-Z]\w*):"
 _NO_ENTITY = r"&(?!(?:#\d+|#x[\da-fA-F]+|amp|lt|gt|quot|apos);)"
 _USD = (".usd", ".usda", ".usdc", ".usdz")
@@ -280,7 +282,8 @@ class _RobotReading:
                 raise self._refuse(
                     word, "is not allowed: the file needs no document type"
                 )
-        parsed = ET.iterparse(io.StringIO(text), ("start", "end"))
+        plain = re.sub(_NAMESPACE, "", text)
+        parsed = ET.iterparse(io.StringIO(plain), ("start", "end"))
         depth = 0
         for event, _ in parsed:
             depth += 1 if event == "start" else -1
