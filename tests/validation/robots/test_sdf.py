@@ -714,7 +714,8 @@ def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
             "<limit/><dynamics/></loop_joint>",
             "left out of the URDF: dynamics, limit",
         ),
-        ("spherical", "fixed", "left out of the URDF: loop_joint"),
+        ("spherical", "fixed", "<loop_joint> B joins two links, but is left out"),
+        ("loop_joint", "loop", "<loop> B joins two links, but is left out"),
         ('"rocker" xyz', '"racker" xyz', "must name two links"),
         (f'xyz="{C} 0 0"', "", "must name two links"),
         (f'xyz="{C} 0 0"', 'xyz="1 0"', "size 3"),
@@ -728,7 +729,7 @@ def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(old, new, said, tmp_
         return
     notes = read(tmp_path, text).notes
     assert said in " ".join(notes)
-    assert ("a URDF is a tree" in " ".join(notes)) == ("fixed" in text)
+    assert (TREE in notes) == ("joins" in said)
 
 
 URDF = """<robot name="r"><link name="base"/>
@@ -743,9 +744,10 @@ ixz="0" iyz="0"/></inertial></link><gazebo/>
 
 
 TREE = (
-    "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE FILE"
-    " --mimic JOINT judges one; to close another, save it as MJCF (mj_saveLastXML) and"
-    " add a <connect> between two sites, one on each link"
+    'no loop is closed in this URDF: <loop_joint name="B" type="revolute"> <link1'
+    ' link="ONE" xyz="0 0 0"/> <link2 link="TWO" xyz="0 0 0"/> </loop_joint> closes'
+    " one, with the pin's place in each link; where a mimic joint stands for a loop,"
+    " check-mjcf SCENE FILE --mimic JOINT judges it"
 )
 IN_GAZEBO = (
     "a joint in <gazebo> may close a loop, but is no URDF (last):"

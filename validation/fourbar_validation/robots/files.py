@@ -194,7 +194,9 @@ class _RobotReading:
         A polynomial is judged by the motion alone, so that links without mass get one.
         """
         pins = self._take_pins(root)
-        left_out = {child.tag for child in root} - {"link", "joint", "material"}
+        kept = ("link", "joint", "material")
+        others = [child for child in root if child.tag not in kept]
+        left_out = {child.tag for child in others}
         if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
@@ -207,6 +209,12 @@ class _RobotReading:
         ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", bounds)
         if left_out:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
+        self.notes += [
+            f"<{one.tag}> {one.get('name', 'without a name')} joins two links, but is"
+            " left out"
+            for one in others
+            if len(one.findall("*[@link]")) > 1
+        ]
         if closing:
             self.notes.append(
                 "a joint in <gazebo> may close a loop, but is no URDF"
@@ -216,9 +224,11 @@ class _RobotReading:
         if pins:
             return
         self.notes.append(
-            "a URDF is a tree: its only loops are mimic joints, and check-mjcf SCENE "
-            "FILE --mimic JOINT judges one; to close another, save it as MJCF "
-            "(mj_saveLastXML) and add a <connect> between two sites, one on each link"
+            'no loop is closed in this URDF: <loop_joint name="B" type="revolute">'
+            ' <link1 link="ONE" xyz="0 0 0"/> <link2 link="TWO" xyz="0 0 0"/>'
+            " </loop_joint> closes one, with the pin's place in each link; where a"
+            " mimic joint stands for a loop, check-mjcf SCENE FILE --mimic JOINT judges"
+            " it"
         )
 
     def _take_pins(self, root: ET.Element) -> list[ET.Element]:
