@@ -49,6 +49,9 @@ CLAMP = """
 stretched.
 """
 
+STRETCHED = re.sub(' range="[^"]*"', "", CLAMP)
+"""The same with hinges that turn without limits."""
+
 
 GRAB = """
 <mujoco><compiler angle="radian"/><worldbody>
@@ -64,11 +67,16 @@ GRAB = """
 @pytest.mark.parametrize(
     "text, joints",
     slow_but(
-        [(CLAMP, {"handle": "1.62 rad"}), (GRAB, {"handle": "70 deg"})],
+        [
+            (CLAMP, {"handle": "1.62 rad"}),
+            (STRETCHED, {}),
+            (GRAB, {"handle": "70 deg"}),
+        ],
         [
             (CLAMP, {}),
             (CLAMP, {"handle": "1.62 rad"}),
             (CLAMP, {"handle": "-20 deg"}),
+            (STRETCHED, {}),
             (GRAB, {}),
             (GRAB, {"handle": "70 deg"}),
         ],

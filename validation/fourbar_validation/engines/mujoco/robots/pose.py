@@ -406,12 +406,16 @@ class _Closing:
     def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,).
 
-        Each moves one joint that has a range to a quarter of it. Fixed joints stay.
+        Each moves one joint to a quarter of its range; that of a hinge without limits
+        is a turn. Bars in line leave it: least squares alone do not. Fixed joints stay.
         """
         for joint in sorted({*self.tied} - fixed):
             place = self.model.jnt_qposadr[joint]
-            if math.isfinite(self.low[place]):
-                ends = (self.low[place], self.high[place])
+            ends = (self.low[place], self.high[place])
+            is_hinge = self.model.jnt_type[joint] == HINGE_JOINT
+            if is_hinge and not self.model.jnt_limited[joint]:
+                ends = (-math.pi, math.pi)
+            if math.isfinite(ends[0]):
                 for value in np.linspace(*ends, 5)[1:-1]:
                     start = stated.copy()
                     start[place] = value
