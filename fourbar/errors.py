@@ -105,16 +105,13 @@ def list_allowed(wrong: str, names: Iterable[str]) -> str:
 
     Then come those that share most parts of a dotted name.
 
-    Names are whole; those beyond LONGEST_LIST characters are counted. For a name of
-    another mechanism the address is returned.
+    Names are whole; those beyond LONGEST_LIST characters are counted.
 
     >>> list_allowed("forc", ["position", "velocity", "force"])
     'must be among force, position, velocity'
     """
     from difflib import get_close_matches
 
-    if any(map(names_other_mechanism, wrong.split("."))):
-        return ELSEWHERE
     names = list(names)
     like = [name for name in names if wrong.casefold() in name.casefold()]
     like += get_close_matches(wrong, names)
@@ -130,6 +127,16 @@ def list_allowed(wrong: str, names: Iterable[str]) -> str:
         shown -= 1
     more = f" and {len(listed) - shown} more" if shown < len(listed) else ""
     return f"must be among {', '.join(listed[:shown])}{more}"
+
+
+def suggest_keys(wrong: str, names: Iterable[str]) -> str:
+    """Say what keys of a scene are allowed in place of a wrong one.
+
+    For a part of another mechanism it is said where that is solved.
+    """
+    if any(map(names_other_mechanism, wrong.split("."))):
+        return ELSEWHERE
+    return list_allowed(wrong, names)
 
 
 def write_count(count: int, noun: str) -> str:
@@ -182,6 +189,8 @@ class InputError(FourBarError):
             shown = " ".join(repr(value).split())  # arrays take several lines
         except ValueError:
             shown = "a huge whole number"
+        except RecursionError:  # deeper than Python writes
+            shown = "..."
         if unit is not None:
             numbers = value if isinstance(value, tuple) else (value,)
             shown = write_in_units(unit, *map(float, numbers))

@@ -22,8 +22,8 @@ from fourbar.effects.place import (
 )
 from fourbar.errors import (
     InputError,
-    list_allowed,
     name_unit,
+    suggest_keys,
 )
 from fourbar.linkage import (
     ANY_NUMBER,
@@ -140,7 +140,7 @@ class Entry:
             raise self.refuse(f"must be a table with the keys {', '.join(names)}")
         for name in self.value:
             if name not in names:
-                known = _WAYS.get(name) or list_allowed(name, names)
+                known = _WAYS.get(name) or suggest_keys(name, names)
                 raise self[name].refuse(f"unknown key; {known}")
         return self.value
 

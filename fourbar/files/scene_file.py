@@ -82,8 +82,10 @@ LARGEST_SCENE_FILE = 500_000
 """Bytes; a scene takes about a thousand."""
 MOST_DOTS_OF_A_LINE = 100
 """Largest number of dots in one line, besides those of decimals. The TOML reader's time
-grows with the square of a dotted key's parts, of which digits leave every other dot.
+grows with the square of a dotted key's parts.
 """
+_DECIMAL = re.compile(r"(?<![\w.-])[-+]?\d+\.\d")
+"""A number with decimals; of a dotted key at most the first dot, however it goes on."""
 LONGEST_SHOWN_LINE = 60
 """Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
@@ -161,7 +163,7 @@ def parse_tables(text: str, name: str) -> dict[str, Any]:
     """
     shown = _write_name(name)
     for number, line in enumerate(text.split("\n"), 1):
-        if re.sub(r"\d\.\d", "", line).count(".") > MOST_DOTS_OF_A_LINE:
+        if _DECIMAL.sub("", line).count(".") > MOST_DOTS_OF_A_LINE:
             allowed = (
                 f"line {number} holds more than {MOST_DOTS_OF_A_LINE} dots besides"
                 " those of decimals"
@@ -436,7 +438,7 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
                 "a commanded value has no tolerance; a speed or acceleration that is"
                 " one for all positions may have one"
             )
-            if not key.startswith(("motion.law.", *COMMAND_KEYS)):
+            if key not in COMMAND_KEYS and not key.startswith("motion.law."):
                 allowed = refuse_key(key, stated, list(entries)).allowed
             raise tolerance.refuse(allowed)
         unit = entries[key].unit

@@ -131,7 +131,8 @@ def to_si(text: str, unit: str) -> float:
 
 def read_bare(text: str) -> float | None:
     """Return the number of a text, a fraction too; None if it has a unit."""
-    if fraction := _FRACTION.fullmatch(text.strip()):
+    text = _strip(text)
+    if fraction := _FRACTION.fullmatch(text):
         return float(_read_fraction(fraction))
     try:
         return float(text)

@@ -10,7 +10,7 @@ from fourbar.effects.place import At, Place
 from fourbar.errors import (
     InputError,
     expect,
-    list_allowed,
+    suggest_keys,
     write_in_units,
 )
 from fourbar.formulas.arithmetic import (
@@ -214,7 +214,7 @@ def command_key(scene: Scene) -> str:
 def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary; keys like it come first."""
     expect("key", key, str)
-    allowed = list_allowed(key, keys)
+    allowed = suggest_keys(key, keys)
     return InputError(key, value, f"is no number of this scene; {allowed}")
 
 

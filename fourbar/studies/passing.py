@@ -69,10 +69,12 @@ def extend_motion(scene: Scene) -> Scene:
     start, stop = places[[0, -1]].tolist()
     if motion.stroke is None:
         turned = TURN * math.floor((begins - start + SAME_POSITION) / TURN)
-        if turns_fully(scene.linkage, motion.bar):
+        ends_within = angles.max() <= stop + turned + SAME_POSITION
+        if turns_fully(scene.linkage, motion.bar) and not ends_within:
             turned = begins - start
         start += turned
         stop += turned
+    motion.find_rates(places)  # which refuses those of each stated position
     sweep = Sweep(start, stop, len(places) - 1)
     return replace(scene, motion=motion.replace(angle=sweep))
 

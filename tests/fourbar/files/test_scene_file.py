@@ -140,6 +140,7 @@ ACROSS_LINES = [
     ('"open"', '"\\n\\u001b[2J\\u202e"', "motion.branch", "\\x1b", "\\u202e"),
     ('title = "good"', "k" * 50000 + " = 1", "unknown key"),
     (GOOD, ".".join(["1"] * 203) + " = 1", "more than 100 dots besides those of"),
+    (GOOD, ".".join(["10"] * 203) + " = 1", "more than 100 dots besides those of"),
     (GOOD, "<mujoco/>", "TOML", "'<mujoco/>': Invalid statement (at line 1, column 1)"),
     (GOOD, 'title = "a"\n\n[lengths\nground = 1', "TOML = '[lengths'"),
 ]

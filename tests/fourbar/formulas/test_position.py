@@ -6,16 +6,19 @@ from pytest import approx
 
 from fourbar import uniform
 from fourbar.formulas.motion import coefficients, take_sines_of_rates
-from fourbar.formulas.path import compute_state
+from fourbar.formulas.path import compute_state, drive_sine_of_triangle
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows
+from tests.support.scenes import bare
 
 EPS = 2.0**-52
 FEW_ROUNDINGS = 8.0 * EPS
 """Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of
 these and h.
 """
+DRIVEN = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
+"""The two bars whose sine a drive on a bar is divided by."""
 
 
 @pytest.mark.parametrize(
@@ -59,3 +62,15 @@ def test_digits_are_kept_where_the_diagonal_is_short(stated, psi, sign):
                 assert abs(ours - right) < FEW_ROUNDINGS / abs(psi)
             if theta_1 == 0.0:  # a small sine has all its digits
                 assert ours.imag == approx(of.imag, rel=4.0 * FEW_ROUNDINGS)
+
+
+@pytest.mark.parametrize("drive", [3, 4])
+@pytest.mark.parametrize("branch", [1, -1])
+def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(branch, drive):
+    lengths = loop(2.0**-14, 1.5, 0.75, 1.25)
+    half = half_angle(lengths, 0.7)
+    position = close_loop(lengths, 1.0, direction(0.7), half, branch)
+    exact = move_in_balls(bare(*lengths[:4]), 2, 0.7, branch)
+    i, j = (exact[f"theta_{number}"] for number in DRIVEN[drive])
+    computed = drive_sine_of_triangle(lengths, position, drive)
+    assert computed == approx(float((j - i).sin()), rel=8.0 * EPS)

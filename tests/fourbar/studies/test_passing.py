@@ -16,6 +16,7 @@ from fourbar import (
     Motion,
     Scene,
     Sweep,
+    Torsion,
     equilibrium,
     limit_positions,
     load,
@@ -30,6 +31,7 @@ from fourbar.errors import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
+from fourbar.scene import command_at
 from fourbar.scene.scene import say_range
 from fourbar.show.located import locate
 from fourbar.studies.passing import (
@@ -218,3 +220,13 @@ def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
         assert abs(kept - angle) == approx(beyond if met else 0.0, rel=1e-6)
         inside = limit - outwards * beyond
         assert meet_limit(linkage, 4, inside, rounding=5e-6) == inside
+
+
+def test_a_turn_begins_no_further_on_than_the_motion_needs():
+    """A torsion spring is wound a turn away from the position that is stated."""
+    effects = (Torsion.at(O2=(1.0, 0.0, 0.0)),)
+    scene = crank_rocker(motion=Motion(radians(90.0), 0.0), effects=effects)
+    there = solve(scene, "position", at=command_at(scene, np.array([radians(65.0)])))
+    near = find_positions(scene, "theta_4", float(there.theta_4[0]))
+    assert near.angle.max() == approx(radians(65.0), abs=LOCATED)
+    assert np.isfinite(solve(scene, at=near).torque).all()
