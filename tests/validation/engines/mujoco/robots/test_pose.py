@@ -49,8 +49,14 @@ CLAMP = """
 stretched.
 """
 
-STRETCHED = re.sub(' range="[^"]*"', "", CLAMP)
-"""The same with hinges that turn without limits."""
+STRETCHED = """
+<mujoco><worldbody><site name="base"/>
+  <body pos="0 0 .2"><joint name="crank" axis="0 1 0"/><geom size=".01"/>
+    <body pos="0 0 .18"><joint axis="0 1 0"/><geom size=".01"/>
+      <body pos="0 0 .36"><joint axis="0 1 0"/><geom size=".01"/>
+        <site name="end" pos="0 0 .26"/></body></body></body></worldbody>
+  <equality><connect site1="end" site2="base"/></equality></mujoco>"""
+"""Bars in one line, on hinges that turn without limits."""
 
 
 GRAB = """
