@@ -188,7 +188,16 @@ def test_the_reason_is_given_where_it_is_no_four_bar(planar, words):
     assert words in closure.reason
 
 
-def test_a_weld_of_three_hinges_leaves_no_freedom():
+YOKE = """
+<mujoco><worldbody><body name="crank"><joint axis="0 1 0"/><geom size=".1"/>
+ <body name="pin" pos="0 0 1"/></body>
+ <body name="yoke"><joint type="slide"/><geom size=".1"/></body></worldbody>
+ <equality><weld body1="pin" body2="yoke"/></equality></mujoco>"""
+
+
+def test_a_weld_of_three_joints_leaves_no_freedom():
+    reason = closure_of(YOKE).reason
+    assert reason == "a weld that leaves no freedom: 2 joints in a plane cannot move"
     text = Planar().text().replace("<connect", "<weld")
     assert "a weld that leaves no freedom: 3 hinges" in closure_of(text).reason
     pin = text.replace("<weld", '<weld torquescale="0"')

@@ -353,6 +353,9 @@ class _Finder:
         is_four = chain.pins == len(PINS)
         if [*chain.others.values()] == [BALL] and is_four and not is_skew:
             yield self._explain_ball(chain)
+        is_rigid = not chain.is_pin and 1 < chain.pins < len(PINS)
+        if is_rigid and not is_skew and [*chain.others.values()] == [SLIDE]:
+            yield self._explain_count(chain)
         for joint, kind in chain.others.items():
             if kind != SLIDE or not is_skew:  # a slider-crank lies in a plane
                 yield f"{name_joint(model, joint)} {self._explain_joint(chain, kind)}"
@@ -461,14 +464,14 @@ class _Finder:
     def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, and what makes it a four-bar."""
         freedoms = chain.pins - 3
-        count = write_count(chain.pins, "hinge")
-        if freedoms <= 0 and chain.is_pin:
-            return f"{count} in a plane cannot move"
+        count = write_count(chain.pins, "joint" if chain.others else "hinge")
         if freedoms <= 0:
-            return (
-                f"a weld that leaves no freedom: {count} in a plane cannot move; a"
-                ' <connect> or torquescale="0" makes a pin of it'
-            )
+            text = f"{count} in a plane cannot move"
+            if not chain.is_pin:
+                text = f"a weld that leaves no freedom: {text}"
+                if freedoms == 0:
+                    text += '; a <connect> or torquescale="0" makes a pin of it'
+            return text
         coupled = self._find_coupled(chain)
         holds = self._suggest_holds(chain, coupled)
         if not holds and coupled:
