@@ -434,6 +434,30 @@ def test_without_a_motor_the_first_hinge_of_the_ground_is_driven():
     assert loop_of(EXCAVATOR, drive="rocker").joint == model.joint("rocker").id
 
 
+@pytest.mark.parametrize(
+    "drive",
+    [
+        'site="tip" gear="1 0 0 0 0 0"',
+        'site="tip" refsite="base" gear="1 0 0 0 0 0"',
+        'tendon="rope"',
+        'slidersite="base" cranksite="tip" cranklength="2"',
+    ],
+)
+def test_what_drives_a_loop_by_no_hinge_is_named(drive):
+    rope = (
+        '<tendon><spatial name="rope"><site site="base"/><site site="tip"/></spatial>'
+    )
+    planar = Planar(
+        drive="",
+        ground='<site name="base"/>',
+        on_coupler='<site name="tip" pos=".01 .02 0"/>',
+        more=f'{rope}</tendon><actuator><motor name="push" {drive}/></actuator>',
+    )
+    (chosen,) = loop_of(planar.text()).chosen
+    remark = "what drives it is on no hinge and is left out (the actuator push)"
+    assert chosen == f"{remark}: O2 is taken as driven (--drive states another)"
+
+
 def test_a_loop_is_chosen_by_its_name():
     posed, loop = pose_loop(Planar().text())
     (chosen,) = find_loops(posed, "coupler-output")

@@ -20,6 +20,7 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     EQUALITY_KINDS,
     climb,
+    describe_actuator,
     find_bits,
     find_ends,
     find_named,
@@ -35,6 +36,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_body,
     name_joint,
     name_part,
+    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
@@ -605,6 +607,20 @@ class _Finder:
         """List the joints of a chain on which what takes a control acts."""
         return [joint for joint in list_motors(self.model) if joint in chain.joints]
 
+    def _list_pulling(self, chain: _Chain) -> Iterator[str]:
+        """Describe the motors that move joints of a chain, on a hinge or not."""
+        model = self.model
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.data.qpos
+        mujoco.mj_fwdPosition(model, data)
+        moments = np.zeros((model.nu, model.nv))
+        places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
+        mujoco.mju_sparse2dense(moments, data.actuator_moment, *places)
+        pulls = moments[:, model.jnt_dofadr[chain.joints]].any(axis=1)
+        for number in np.flatnonzero(pulls).tolist():
+            if takes_control(model, number):
+                yield describe_actuator(model, number)
+
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.
 
@@ -749,6 +765,8 @@ class _Finder:
             reason = "no motor acts on it"
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
+            elif pulling := ", ".join(self._list_pulling(chain)):
+                reason = f"what drives it is on no hinge and is left out ({pulling})"
         elif len({*driven}) == 1:
             return chosen, []
         taken = f"{name_joint(model, chosen)} is taken as driven"
