@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
@@ -11,7 +11,12 @@ from typing import Any
 import click
 
 # first of all: with it an interruption while NumPy is imported is one line
-from fourbar.errors import ELSEWHERE, InputError, state_messages_in
+from fourbar.errors import (
+    ELSEWHERE,
+    InputError,
+    NotAssembledError,
+    state_messages_in,
+)
 from fourbar.linkage import ANY_NUMBER, BAR_NAMES, POSITIVE, require
 from fourbar.quantities.units import half_unit_of_text, read_bare
 from fourbar.scene import Command, Scene
@@ -255,11 +260,14 @@ def read_positions(scene: Scene, text: str) -> Command:
     stated = read_number("--at", value, unit)
     if name == motion.commanded:
         return find_commanded(scene, stated)
+    range_of_bar = extend_motion(scene)
     if unit == "rad":
         rounding = half_unit_of_text(value, unit)
         met = meet_limit(scene.linkage, int(name[-1]), stated, rounding)
-        value = value if met == stated else f"{met!r} rad"
-    return locate(extend_motion(scene), name, value)
+        if met != stated:
+            with suppress(NotAssembledError):  # it may be one of the other assembly
+                return locate(range_of_bar, name, f"{met!r} rad")
+    return locate(range_of_bar, name, value)
 
 
 def require_unit(key: str, text: str, value: str, likely: str) -> None:

@@ -34,7 +34,9 @@ def test_every_entry_fits_its_module_and_says_what_catches_it():
     for entry in read_faults():
         assert inject_fault(entry)
         if "tests" in entry:
-            assert (CHECKOUT / entry["tests"].partition("::")[0]).is_file()
+            path, _, test = entry["tests"].partition("::")
+            text = (CHECKOUT / path).read_text("utf-8")
+            assert f"def {test.partition('[')[0]}" in text
         else:
             assert entry["scenes"] and set(entry["scenes"]) <= FAULT_SCENES.keys()
             assert entry["caught_by"] or entry["harmless"], entry["fault"]

@@ -180,7 +180,7 @@ ADDED = {
 """Files in which the guide puts a line of its quantity, and the line beside it."""
 JUDGED = """
 from fourbar.files import loads
-from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
+from fourbar_validation.engines.registry import HARD_ENGINES
 from fourbar_validation.run.judge import judge
 
 exact = [engine for engine in HARD_ENGINES if not engine.through_time]

@@ -104,7 +104,7 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
         process = start(what, tmp_path, mark)
         with leaving_nothing(mark):
             started = STARTING if by_terminal or what == "loops" else b"busy.py"
-            wait_until(partial(has_process, started, mark), 30.0)
+            wait_until(partial(has_process, started, mark), 30.0 * BUSY)
             time.sleep(moment)
             (os.killpg if by_terminal else os.kill)(process.pid, ended_by)
             _, errors = process.communicate(timeout=PATIENCE)

@@ -719,3 +719,14 @@ def test_a_linkage_moves_as_the_bar_of_another_does(show):
     document = strict(show("analyze", second, "--positions", positions, "--json"))
     assert document["torque"] == expected.torque.tolist()
     assert document["alpha_4"] == expected.alpha_4.tolist()
+
+
+def test_a_limit_of_the_output_is_met_by_its_rounding(run, show):
+    """It is at 101.862 deg, beyond the angle that is typed."""
+    lengths = '{ ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }'
+    motion = '{ theta_2 = "60 deg", omega_2 = "60 rpm" }'
+    Path("scene.toml").write_text(f"lengths = {lengths}\nmotion = {motion}")
+    out = show("analyze", "scene.toml", "--at", "theta_4=101.86 deg")
+    assert re.search(r"bar 4 +101\.8620 ", out)
+    code, _, error = run("analyze", "scene.toml", "--at", "theta_4=258.138 deg")
+    assert code == BAD_INPUT and "258.138 deg" in error

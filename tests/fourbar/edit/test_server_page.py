@@ -119,19 +119,23 @@ class Page:
     def numbers(self, *names):
         return [float(self.text(name).replace("−", "-")) for name in names]
 
-    def click_at(self, x, y):
-        """Click a pixel of the picture, off the grid."""
+    def click_at(self, x, y, *held):
+        """Click a pixel of the picture while keys are held."""
         picture = self.element("picture")
         off = x - picture.size["width"] / 2, y - picture.size["height"] / 2
-        chain = ActionChains(self.driver).key_down(Keys.SHIFT)
+        chain = ActionChains(self.driver)
+        for key in held:
+            chain.key_down(key)
         chain.move_to_element_with_offset(picture, *off).click()
-        chain.key_up(Keys.SHIFT).perform()
+        for key in held:
+            chain.key_up(key)
+        chain.perform()
 
     def click_pins(self, width, *pixels):
-        """Draw O2, A, B and O4 in an empty drawing of a width."""
+        """Draw O2, A, B and O4 in an empty drawing of a width, off the grid."""
         self.type("sketch-width", width)
         for pixel in pixels:
-            self.click_at(*pixel)
+            self.click_at(*pixel, Keys.SHIFT)
 
     def save(self):
         self.click("save")

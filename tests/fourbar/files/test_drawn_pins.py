@@ -75,7 +75,7 @@ def find_gap(pins):
 
 
 DRAWINGS = int(os.environ.get("DRAWINGS", "1000"))
-"""Drawings at random of the slow test, a tenth of them with change points; `make
+"""Drawings at random of the slow test, and a tenth as many with change points; `make
 long-fuzz` takes 10 000.
 """
 
