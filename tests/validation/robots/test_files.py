@@ -65,8 +65,11 @@ def test_a_complaint_of_mujoco_names_the_element_and_no_line_of_another_text(tmp
         compile_robot(read_robot(path))
 
 
-def test_a_missing_mesh_that_is_the_mass_is_said(tmp_path):
+@pytest.mark.parametrize("discards", ["true", "false"])
+def test_a_missing_mesh_that_is_the_mass_is_said(discards, tmp_path):
     path = make(tmp_path)
+    compiler = f'<compiler discardvisual="{discards}"'
+    path.write_text(path.read_text().replace("<compiler", compiler))
     fixed = '<body name="base"><geom type="mesh" mesh="part"/></body><body name="arm">'
     path.write_text(path.read_text().replace('<body name="arm">', fixed))
     robot = compile_robot(read_robot(path))

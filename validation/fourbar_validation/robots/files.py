@@ -213,7 +213,7 @@ class _RobotReading:
             f"<{one.tag}> {one.get('name', 'without a name')} joins two links, but is"
             " left out"
             for one in others
-            if len(one.findall("*[@link]")) > 1
+            if len({end.tag for end in one.findall("*[@link]")}) > 1
         ]
         if closing:
             self.notes.append(

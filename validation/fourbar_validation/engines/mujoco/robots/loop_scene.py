@@ -13,7 +13,6 @@ from decimal import Decimal
 
 import mujoco
 import numpy as np
-from scipy import ndimage
 
 from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
 from fourbar.errors import InputError
@@ -465,9 +464,10 @@ class SceneOfLoop(SeenLoop):
                 self.loop.name,
                 "no position is within the ranges of its hinges",
             )
-        runs, _ = ndimage.label(free)
-        nearest = min(np.flatnonzero(free), key=lambda place: abs(place - in_pose))
-        low, high = angles[runs == runs[nearest]][[0, -1]].tolist()
+        places = np.flatnonzero(free)
+        runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+        run = min(runs, key=lambda run: np.abs(run - in_pose).min())
+        low, high = angles[run[[0, -1]]].tolist()
         start = max(low, min(near, high - math.tau))
         stop = min(high, start + math.tau)
         at_start = {

@@ -15,7 +15,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy import ndimage
 
 from fourbar.effects import Flywheel
 from fourbar.errors import InputError, LimitError, write_count
@@ -234,9 +233,9 @@ def measure_loop(
 def _find_longest_run(states: InsideAnswer) -> Array:
     """Return the most angles in a row at which the loop closes, in their order."""
     angles = np.union1d(states.rows.angle, states.open)
-    runs, _ = ndimage.label(np.isin(angles, states.rows.angle))
-    _, *counts = np.bincount(runs, minlength=2)
-    return np.asarray(angles[runs == 1 + np.argmax(counts)])
+    closed = np.flatnonzero(np.isin(angles, states.rows.angle))
+    runs = np.split(closed, np.flatnonzero(np.diff(closed) > 1) + 1)
+    return np.asarray(angles[max(runs, key=len)])
 
 
 def _describe_findings(

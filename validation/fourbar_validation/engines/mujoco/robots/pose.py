@@ -106,8 +106,9 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             for number, body in enumerate(spec.bodies)
             if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
         }
+        other = spec.copy()  # compiling takes what is only visual out of it
         model = spec.compile()
-        masses = _list_unknown_masses(spec, file, model)
+        masses = _list_unknown_masses(other, file, model)
     except ValueError as error:
         # its lines are those of a text that is written anew, and not of the file
         stated = re.sub(r", line \d+", "", str(error))

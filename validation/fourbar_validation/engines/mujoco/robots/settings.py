@@ -272,7 +272,7 @@ class SettingsSearch:
 
         If none serves in time, the most accurate one is returned.
         """
-        choices = [*self._list_choices()]
+        choices = self._list_choices()
         if self.measure(self.solver).error < 0.9 * self.measure({}).error:
             choices.append([self.solver])
         combinations = [
