@@ -31,7 +31,7 @@ def test_a_loop_is_measured_in_its_robot_and_settings_are_advised(tmp_path):
         assert words in join_lines(checked)
     advised = call(advise, FOOT, "--loop", "rod", "--speed", "2", "--error", "0.01")
     assert advised.return_value == 0, advised.output
-    assert "Type this for an error within 0.01" in advised.output
+    assert "Type this into the MJCF for an error within 0.01" in advised.output
     assert '<connect name="rod" site1="rod_end" site2="heel"' in advised.output
     assert "pad" not in advised.output and "flywheel" not in advised.output
 

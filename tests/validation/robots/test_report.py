@@ -154,7 +154,7 @@ def test_a_limit_of_the_bar_that_is_driven_is_told():
     "solref, error, reached, said",
     read_rows("""
  | 0.001 | within | The file is within 0.01 as it is.
-1 1 | 0.001 | within | Type this for an error within 0.01:
+1 1 | 0.001 | within | Type this into the MJCF for an error within 0.01:
 1 1 | 0.1 | | None of 9 combinations was within 0.01; the best:
  | 0.1 | | None of 9 combinations was within 0.01; the best is the file
  | inf | | None of 9 combinations has an answer: too many steps

@@ -702,7 +702,7 @@ def test_settings_are_not_asked_of_a_file_that_cannot_state_them(way, tmp_path):
 def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
     file = read(tmp_path, STATED["loop joint of a URDF"])
     assert measure(file, error=0.01).advice.typed == (
-        '<connect name="B" solimp="0.9999 0.9999 0.001 0.5 2" />',
+        '<connect solimp="0.9999 0.9999 0.001 0.5 2" />',
     )
 
 

@@ -232,9 +232,10 @@ def _describe_loop(
         if loop.through_time.other_assembly is not None:
             place = write_degrees(loop.through_time.other_assembly)
             yield (
-                "through time MuJoCo goes over to the other assembly beside a change"
-                f" point, seen at {loop.joint} = {place} deg: no state from there on is"
-                " in a percentage"
+                f"through time {name_following(command(loop.scene).bar)} come into"
+                " line, and MuJoCo goes over to the other assembly, seen at"
+                f" {loop.joint} = {place} deg: no state from there on is in a"
+                " percentage"
             )
         worst = loop.through_time.rows[loop.through_time.rows.gap.argmax()]
         yield (
@@ -365,7 +366,7 @@ def describe_advice(
             f" best{':' if best.changes else ' is the file as it is.'}"
         )
     elif best.changes:
-        yield f"Type this for an error within {advice.wanted:g}:"
+        yield f"Type this into the MJCF for an error within {advice.wanted:g}:"
     else:
         yield f"The file is within {advice.wanted:g} as it is."
     for element in advice.typed:

@@ -378,6 +378,7 @@ def test_going_over_to_the_other_assembly_is_said_and_is_in_no_percentage():
     assert errors_of(loop)[MEASURED_THROUGH_TIME].part < 0.5
     blocks = map(str, describe_measurement(RobotMeasurement((loop,), ())))
     (said,) = (text for text in blocks if "goes over to the other assembly" in text)
+    assert said.startswith("through time coupler and output come into line, and")
     assert "seen at j2 = " in said
 
 

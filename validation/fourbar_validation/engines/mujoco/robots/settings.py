@@ -321,10 +321,9 @@ class SettingsSearch:
         equalities = [one for one in elements if one.tag != "equality"]
         for number in loop.closures:
             # that of a URDF is no element of it
-            one = ET.Element("connect", name=loop.name)
-            if equalities:
-                one = equalities[number]
-            written.append((one.tag, one.attrib, closure))
+            one = equalities[number] if equalities else ET.Element("connect")
+            own = one.attrib if file.kind == "MJCF" else {}
+            written.append((one.tag, own, closure))
         joints = [
             one.attrib
             for one in root.findall(".//worldbody//*")
