@@ -36,7 +36,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_body,
     name_joint,
     name_part,
-    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
@@ -607,19 +606,17 @@ class _Finder:
         """List the joints of a chain on which what takes a control acts."""
         return [joint for joint in list_motors(self.model) if joint in chain.joints]
 
-    def _list_pulling(self, chain: _Chain) -> Iterator[str]:
-        """Describe the motors that move joints of a chain, on a hinge or not."""
+    def _describe_pulling(self, chain: _Chain) -> str:
+        """Describe the motors that move joints of a chain."""
         model = self.model
-        data = mujoco.MjData(model)
-        data.qpos[:] = self.data.qpos
+        data = self.data
         mujoco.mj_fwdPosition(model, data)
-        moments = np.zeros((model.nu, model.nv))
+        pulls = np.zeros((model.nu, model.nv))
         places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
-        mujoco.mju_sparse2dense(moments, data.actuator_moment, *places)
-        pulls = moments[:, model.jnt_dofadr[chain.joints]].any(axis=1)
-        for number in np.flatnonzero(pulls).tolist():
-            if takes_control(model, number):
-                yield describe_actuator(model, number)
+        mujoco.mju_sparse2dense(pulls, data.actuator_moment, *places)
+        moving = pulls[:, model.jnt_dofadr[chain.joints]].any(axis=1)
+        motors = np.flatnonzero(model.actuator_gainprm.any(axis=1) & moving)
+        return ", ".join(describe_actuator(model, one) for one in motors.tolist())
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.
@@ -765,7 +762,7 @@ class _Finder:
             reason = "no motor acts on it"
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
-            elif pulling := ", ".join(self._list_pulling(chain)):
+            elif pulling := self._describe_pulling(chain):
                 reason = f"what drives it is on no hinge and is left out ({pulling})"
         elif len({*driven}) == 1:
             return chosen, []
