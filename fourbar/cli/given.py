@@ -151,6 +151,9 @@ class LengthsCommand(click.Command):
             message = error.message.removesuffix(".")
             if not re.search(r"extra arguments? \([\d.]|takes 4 values", message):
                 raise
+            if message.endswith("values"):
+                names = ", ".join(LENGTH_NAMES)
+                message += f", {names} (fourbar analyze takes a scene file)"
             raise click.UsageError(f"{message}: {ELSEWHERE}", ctx) from None
 
 

@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.errors import ELSEWHERE, InputError, names_other_mechanism
+from fourbar.errors import (
+    ELSEWHERE,
+    InputError,
+    list_allowed,
+    names_other_mechanism,
+)
 from fourbar.quantities import STAGE_OF, Array, find_derived
 from fourbar.scene import Command, ReleaseOrigin, Scene, command_at, find_signs
 from fourbar.show.derived import derive, list_derived_names
@@ -189,13 +194,12 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
     reaction = re.sub(r"^F(\d)(\d)", r"F\2\1", name)
     if reaction != name and _is_number(with_speed, reaction):
         return InputError("--columns", name, f"is the reaction of {reaction}: minus it")
-    there = ", ".join(["time", *list_column_quantities(solution)])
+    allowed = list_allowed(name, ["time", *list_column_quantities(with_speed)])
     return InputError(
         "--columns",
         name,
-        f"unknown; quantities are {there}; F12_x is a component, omega_4/omega_2"
-        " a ratio, theta_3-theta_2 a difference, F_P/F_Q the ratio of the forces along"
-        " the paths of two points",
+        f"{allowed}; F12_x is a component, omega_4/omega_2 a ratio, theta_3-theta_2 a"
+        " difference, F_P/F_Q the ratio of the forces along the paths of two points",
     )
 
 

@@ -145,7 +145,8 @@ class MotionCurves:
         solution = self.solve_between()
         _, senses = find_held(solution)
         largest = dict[str, float]()
-        for sense in (1.0, -1.0):
+        # where every position starts, its acceleration says the one direction
+        for sense in (1.0, -1.0) if (senses == 0.0).any() else (1.0,):
             speed = _BEGINNING * np.where(senses == 0.0, sense, senses)
             begun = solve(self.scene, at=solution.at._replace(speed=speed))
             loads = compute_pin_loads(begun)

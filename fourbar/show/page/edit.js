@@ -159,7 +159,8 @@ function showPositions() {
   rows.forEach((i, n) => {
     const at = body.rows[n] ?? rowOf(body);
     at.dataset.row = i;
-    const texts = names.map(name => ranged(valuesAt(i), name, v => Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name.endsWith("_error") ? 2 : 5)));
+    const here = valuesAt(i);
+    const texts = names.map(name => ranged(here, name, v => Array.isArray(v) ? text(v[0] === null ? null : inUnit("N", Math.hypot(...v))) : text(v === null ? null : v * factor(LABELS[name][1]), name.endsWith("_error") ? 2 : 5)));
     at.cells[0].firstChild.textContent = grid[i] === null ? "\u2013" : fixed(grid[i] * DEG, 2);
     if (single()) texts.unshift(fixed(axis().values[i] * axis().factor, timed() ? clock : 2));
     while (at.cells.length > texts.length + 1) at.deleteCell(-1);

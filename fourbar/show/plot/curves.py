@@ -89,7 +89,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     for label, (values, look) in chart.curves.items():
         finite = np.where(np.isfinite(values), factor * values, np.nan)
         shown = np.insert(finite, rows, np.nan)
-        axes.plot(places, shown, label=label, **look)
+        axes.plot(places, shown, **{"label": label} | look)
     for pole in poles:
         axes.axvline(pole, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
     if len(poles):
@@ -122,6 +122,7 @@ def _note_largest(view: View, chart: Chart, limit: float) -> None:
     }
     label = max(largest_of, key=largest_of.__getitem__)
     values, _ = chart.curves[label]
+    name = write_plain(label) if "$" in label else label
     index = find_peak_index(values)
     words = view.axis.words(view.sweep.at.places[index], 5)
     end, largest = (
@@ -129,8 +130,8 @@ def _note_largest(view: View, chart: Chart, limit: float) -> None:
         for value in (limit, values[index])
     )
     view.note(
-        f"{chart.title} clipped at {end}; the largest evaluated, {write_plain(label)} ="
-        f" {largest}, is at {words}."
+        f"{chart.title} clipped at {end}; the largest evaluated, {name} = {largest},"
+        f" is at {words}."
     )
 
 
@@ -272,9 +273,9 @@ def list_demand(view: View) -> Chart:
     chart = _list_drive(drive.keys.value, drive.symbol[0], what, view)
     rests = leaves_range(view.sweep)
     if np.any(rests[1:] & rests[:-1]):  # one position alone is no line
-        look = {"color": MUTED, "ls": "--"}
         for end, label in zip(drive.keys[2:], ("begins to move", "_"), strict=True):
-            chart.curves[label] = np.where(rests, view.sweep[end], np.nan), look
+            look = {"color": MUTED, "ls": "--", "label": label}
+            chart.curves[end] = np.where(rests, view.sweep[end], np.nan), look
     return chart
 
 

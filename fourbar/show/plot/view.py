@@ -20,7 +20,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
-from fourbar.show.driving import leaves_range, read_drive_demand
+from fourbar.show.driving import find_held, leaves_range, read_drive_demand
 from fourbar.show.plot.style import join_points, write_labelled_quantity
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
@@ -199,7 +199,7 @@ class View:
         if not leaves_range(solution).any():
             return
         text = "Dry friction at rest is taken as 0"
-        if len(solution) == 1:
+        if len(solution) == 1 and len(find_held(solution)[0]):
             drive = read_drive_demand(solution)
             low, high = (
                 write_labelled_quantity(solution[end][0], drive.unit, self.units)

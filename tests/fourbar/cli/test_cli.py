@@ -608,6 +608,7 @@ mjcf --lengths 50in 2in 4in 4.5in -o a.xml | lengths = 50, 2, 4, 4.5 in: the bar
 classify 50 2 4 4.5 | lengths = 50, 2, 4, 4.5: the bars
 
 # other mechanisms
+classify 50mm 150mm 0mm | takes 4 values, ground, input, coupler, output (fourbar
 classify 50mm 150mm 0mm | sliders and several loops (six bars) in PMKS+
 classify 1 2 3 4 5 6 | several loops (six bars) in PMKS+
 new f.toml --lengths 1m 2m 3m 4m 5m 6m | several loops (six bars) in PMKS+

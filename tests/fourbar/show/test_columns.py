@@ -61,7 +61,7 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
 
 
 UNKNOWN = read_rows("""
-tork | unknown; quantities are time, theta_2
+tork | must be among torque, time, theta_2
 F12_z | F12_x is a component
 torque_x | unknown
 P/F12 | is a place: P_x or P_y
@@ -85,7 +85,7 @@ def test_a_column_that_needs_a_speed_says_so():
         columns(still, "time")
     law = Motion(law=Sine(1.0, 0.5, 2.0, duration=3.0))
     for scene in (still, replace(TURN, motion=law)):
-        with raises(InputError, match="unknown; quantities are"):
+        with raises(InputError, match="must be among torque, time"):
             columns(scene, "tork")
 
 

@@ -256,7 +256,7 @@ omega_4 | 1 rad/s | constant; omega_4 is 1 rad/s
 omega_4 | max | constant; omega_4 is 1 rad/s
 alpha_4 | max | constant; alpha_4 is 0 rad/s
 alpha_4 | 1 rad/s^2 | constant; alpha_4 is 0 rad/s
-tork | 1 N m | --at = .tork.: unknown; quantities are
+tork | 1 N m | --at = .tork.: must be among torque
 B_y | 0.6 | unit is missing; did you mean "0.6 m"
 B_y | 6 s | --at
 omega_4/omega_2 | 1 s | --at

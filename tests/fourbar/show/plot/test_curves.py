@@ -7,13 +7,15 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from pytest import approx
 
 import fourbar
-from fourbar import Gravity, Motion, Point, Sweep, solve
+from fourbar import Friction, Gravity, Motion, Point, Sweep, solve
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
+from fourbar.show.plot.curves import CHARTS, draw_chart
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.view import make_view
 from tests.support.rows import read_rows
@@ -142,3 +144,11 @@ def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
     drawn = join(list_lines("centres", scene)["$I_{24}$"])
     (first, *_) = drawn[np.isfinite(drawn)]
     assert np.nanmin(np.abs(places - first)) < 1e-9
+
+
+def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
+    friction = Friction.at(O2=2.0)
+    turn = Motion(Sweep(0.0, 2.0 * np.pi, 200), 0.0)
+    view = make_view(crank_rocker(motion=turn, drive_bar=4, effects=(friction,)))
+    draw_chart(Figure().subplots(), view, CHARTS["drive"])
+    assert re.search("largest evaluated, torque_(low|high) = ", view.notes[-1])
