@@ -63,9 +63,9 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
 UNKNOWN = read_rows("""
 tork | must be among torque, time, theta_2
 F12_z | F12_x is a component
-torque_x | unknown
+torque_x | must be among torque, time
 P/F12 | is a place: P_x or P_y
-drive_force | unknown
+drive_force | must be among time, theta_2
 F34_y | is the reaction of F43_y: minus it
 """)
 
