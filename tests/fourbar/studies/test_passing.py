@@ -119,7 +119,7 @@ def test_a_commanded_angle_out_of_range_is_refused_with_the_range():
 
 REFUSED = [
     (crank_rocker(), "theta_4", 0.0, "no position has it"),
-    (crank_rocker(), "stroke", 0.3, "unknown"),
+    (crank_rocker(), "stroke", 0.3, "must be among time"),
 ]
 
 
