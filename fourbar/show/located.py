@@ -11,7 +11,7 @@ from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_un
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import require
 from fourbar.quantities import Array
-from fourbar.quantities.units import NUMBER_TEXT
+from fourbar.quantities.units import read_bare
 from fourbar.scene import Command, Scene
 from fourbar.show.columns import read_column
 from fourbar.show.shown_units import drop_rounding
@@ -79,17 +79,18 @@ class _LocatedSearch:
         stage = "error" if name.endswith("_error") else "force"
         if find_last_stage(scene) == "position" or name in STATED_POSITIONS:
             stage = "position"
-        self.course = MotionCourse(scene, stage)
+        # beside a position without a value it may grow without bound
+        self.course = MotionCourse(
+            scene, stage, holds=lambda of: np.isfinite(self._read_column(of))
+        )
         self.commanded = self.course.commanded
         column = read_column(self.course.solution, name)
         self.unit = column.unit if column.label({}) else "1"
         """SI unit; that of a pure number is 1."""
         if "1" not in (self.unit, column.divisor):
             self.unit = f"({column.unit})/({column.divisor})"
-        # beside a position without a value it may grow without bound
-        self.course.refine(lambda solution: np.isfinite(self._read_column(solution)))
         self.places = self.course.places
-        self.values = self._read_column(self.course.solution)
+        self.values = where_assembled(self.course.solution, column.values)
         self.is_extreme = np.zeros(len(self.values), dtype=bool)
 
     def _read(self, places: Array) -> Array:
@@ -146,13 +147,15 @@ class _LocatedSearch:
         finite = self.values[np.isfinite(self.values)]
         if not finite.size:
             raise NotAssembledError(f"--at {self.name}: it has no value in this motion")
-        # the largest value may stand beside a pole
-        sizes = np.abs(finite[finite != 0.0])
+        # the largest value may stand beside a pole, where many places are
+        usual = self.values[np.isin(self.places, self.course.even)]
+        usual = usual[np.isfinite(usual)]
+        sizes = np.abs(usual[usual != 0.0])
         self.usual = float(np.percentile(sizes, USUAL)) if sizes.size else 0.0
         if np.ptp(finite) <= CONSTANT * np.abs(finite).max():
             raise self._refuse(text, "it is constant")
         self._locate_extremes()
-        extent = float(np.percentile(np.abs(finite - np.median(finite)), USUAL))
+        extent = float(np.percentile(np.abs(usual - np.median(usual)), USUAL))
         if text in EXTREMES:
             sided = EXTREMES[text] * self.values
             row = int(np.nanargmin(sided))
@@ -187,10 +190,9 @@ class _LocatedSearch:
 
     def _read_value(self, text: str) -> float:
         """Read the value that is sought; InputError where its unit is missing."""
-        if not NUMBER_TEXT.fullmatch(text):
-            return require("value", text, self.unit)
-        if self.unit == "1":
-            return require("value", float(text))
+        number = read_bare(text)
+        if number is None or self.unit == "1":
+            return require("value", text if number is None else number, self.unit)
         hint = f'the unit is missing; did you mean "{text} {name_unit(self.unit)}"?'
         raise InputError("value", f"{self.name}={text}", hint)
 

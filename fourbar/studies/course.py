@@ -23,6 +23,7 @@ there as the root of what is commanded.
 """
 SAME_PLACE = 1e-12
 """Part of a motion within which two of its times are one."""
+Condition = Callable[[Solution], NDArray[np.bool_]]
 Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
@@ -74,10 +75,17 @@ class MotionCourse:
     A scene that states single positions has the range that holds the first of them.
 
     `released`: solution of the scene's free motion, which is then not integrated again.
+
+    `holds`: there are more places where it ceases to hold, at first where the linkage
+    ceases to assemble.
     """
 
     def __init__(
-        self, scene: Scene, stage: str, released: Solution | None = None
+        self,
+        scene: Scene,
+        stage: str,
+        released: Solution | None = None,
+        holds: Condition = lambda solution: solution.assembled,
     ) -> None:
         self.scene = scene
         self.stage = stage
@@ -89,9 +97,11 @@ class MotionCourse:
         self.released = released
         self.places = self._list_places()
         """Commanded angles or strokes, or times, in the order of the motion, (n,)."""
+        self.even = self.places
+        """Those of them that do not crowd where the condition ceases to hold."""
         self.solution = self.solve(self.places)
         """Solution at the places."""
-        self.refine(lambda solution: solution.assembled)
+        self._refine(holds)
 
     @property
     def commanded(self) -> str:
@@ -137,8 +147,8 @@ class MotionCourse:
             places = np.union1d(places[apart > SAME_PLACE * np.ptp(places)], knots)
         return places
 
-    def refine(self, holds: Callable[[Solution], NDArray[np.bool_]]) -> None:
-        """Add places where a condition, such as that it assembles, ceases to hold."""
+    def _refine(self, holds: Condition) -> None:
+        """Add places where a condition ceases to hold."""
         held = holds(self.solution)
         rows = np.flatnonzero(held[1:] != held[:-1])
         if not rows.size:

@@ -337,3 +337,25 @@ def test_a_force_grows_without_bound_beside_a_change_point():
     assert np.hypot(*forces.T) == approx(5e3, rel=1e-9)
     with raises(NotAssembledError, match="it has none, and grows without bound"):
         locate(scene, "F14", "max")
+
+
+def test_what_crowds_beside_a_pole_leaves_the_other_extremes_apart():
+    """A kite has both ends of its range, and a change point, at its positions."""
+    scene = Scene(
+        uniform(0.2, 0.2, 0.1, 0.1),
+        Motion(Sweep(0.0, tau, 12), 1.0),
+        effects=(Gravity(),),
+    )
+    for text in ("1 N", "2 N"):
+        found = locate(scene, "F14", text).places
+        forces = solve(replace(scene, motion=Motion(found, 1.0))).F14
+        assert np.hypot(*forces.T) == approx(float(text[0]), rel=1e-9)
+    assert locate(scene, "F14", "min").places == approx([1.02719453])
+
+
+def test_a_pure_number_is_read_as_any_other():
+    plain, minus, fraction = (
+        locate(crank_rocker(), "omega_4/omega_2", text).angle
+        for text in ("-0.25", "\N{MINUS SIGN}0.25", "-1/4")
+    )
+    assert minus == approx(plain) and fraction == approx(plain)
