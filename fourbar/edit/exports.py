@@ -31,7 +31,7 @@ from fourbar.linkage import PIN_FORCE
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import SceneBlock
-from fourbar.show.driving import leaves_range, read_drive_demand
+from fourbar.show.driving import lacks_friction, read_drive_demand
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
 from fourbar.show.plot.view import list_limits
 from fourbar.show.shown_units import COMMON, write_short
@@ -131,7 +131,7 @@ def write_headline(
         at_pins = ", ".join(filter(None, places))
         if sizes:
             parts.append(f"{what} {text}{at_pins and f' at {at_pins}'}{among}")
-    if leaves_range(solution).any():
+    if lacks_friction(solution).any():
         parts.append("dry friction at rest taken as 0")
     if facts is None:
         least = math.asin(min(float(np.nanmin(np.abs(solution.sin_mu))), 1.0))

@@ -649,12 +649,11 @@ class SceneBlock(Facts):
             (-1.0, LOWER, LINE.low, ", and the rod's area besides, to pull"),
         ):
             force = sense * panels.find_peak(LINE.value, rank).value
-            if (ends := getattr(solution, end)) is not None:
-                starts = self.motion.starts
-                ends = sense * np.where(np.isnan(starts), ends, starts)
-                # values at rest leave out the friction that a start works against
-                force = 0.0 if self.motion.start else force
-                force = max(force, np.nanmax(ends))
+            if self.motion.start:  # the peak leaves out the friction it works against
+                force = 0.0
+            if getattr(solution, end) is not None:
+                demand = self.motion.read_demand(end)
+                force = max(force, np.nanmax(sense * demand))
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(

@@ -199,7 +199,7 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
         "--columns",
         name,
         f"{allowed}; F12_x is a component, omega_4/omega_2 a ratio, theta_3-theta_2 a"
-        " difference, F_P/F_Q the ratio of the forces along the paths of two points",
+        " difference, F_P/F_Q a ratio of forces along paths",
     )
 
 

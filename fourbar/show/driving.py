@@ -53,10 +53,10 @@ def read_drive_demand(solution: Solution) -> Driving:
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
-def leaves_range(solution: Solution) -> Any:
-    """Return where dry friction at rest leaves the drive a range, (n,).
+def lacks_friction(solution: Solution) -> Any:
+    """Return where dry friction at rest is left out, (n,).
 
-    Torque or force of the drive and the pin forces are without that friction there.
+    Torque or force of the drive and the pin forces are without it there.
     """
     low, high = (getattr(solution, end) for end in read_drive_demand(solution).keys[2:])
     if low is None:
@@ -64,16 +64,23 @@ def leaves_range(solution: Solution) -> Any:
     return np.isfinite(high - low) & (low < high)
 
 
-def find_held(solution: Solution) -> tuple[Any, Array]:
-    """Return the rows in which dry friction holds a pin, (k,), and senses of starts.
+def find_starts(solution: Solution) -> Array:
+    """Return the senses in which positions at rest start to move, (n,).
 
-    A position at rest with an acceleration starts to move, and nothing is held there:
-    its sense is that of the acceleration, 1 or -1. Elsewhere it is 0, (n,).
+    That of a position with dry friction is the sense of its acceleration, 1 or -1.
+    Elsewhere it is 0.
     """
-    held = leaves_range(solution)
-    at_rest = held & (solution.at.speed == 0.0)
-    senses = at_rest * np.sign(solution.at.acceleration)
-    return np.flatnonzero(held & (senses == 0.0)), senses
+    at_rest = lacks_friction(solution) & (solution.at.speed == 0.0)
+    senses: Array = at_rest * np.sign(solution.at.acceleration)
+    return senses
+
+
+def leaves_range(solution: Solution) -> Any:
+    """Return where dry friction holds a pin and leaves the drive a range, (n,).
+
+    Nothing is held where a start has its acceleration.
+    """
+    return lacks_friction(solution) & (find_starts(solution) == 0.0)
 
 
 def name_places(solution: Solution) -> tuple[str, str]:

@@ -217,8 +217,7 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
         numbers[f"rms_{name}"] = motion.find_rms(curve)
     largest = numbers[f"peak_{kind}"]
     if motion.start is not None and largest is not None:
-        at_rest = motion.solve_between()[drive.keys.value]
-        demand = np.where(np.isnan(motion.starts), at_rest, motion.starts)
+        demand = motion.read_demand(drive.keys.value)
         numbers[f"peak_{kind}"] = float(np.nanmax(np.abs(demand)))
     fastest = motion.find_peak("speed")
     numbers["peak_speed"] = fastest and abs(fastest.value)

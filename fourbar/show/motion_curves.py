@@ -18,7 +18,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
-from fourbar.show.driving import find_held, is_once_round, read_drive_demand
+from fourbar.show.driving import find_starts, is_once_round, read_drive_demand
 from fourbar.show.panels import (
     DEEP,
     SHALLOW,
@@ -143,7 +143,7 @@ class MotionCurves:
         acceleration says which.
         """
         solution = self.solve_between()
-        _, senses = find_held(solution)
+        senses = find_starts(solution)
         largest = dict[str, float]()
         # where every position starts, its acceleration says the one direction
         for sense in (1.0, -1.0) if (senses == 0.0).any() else (1.0,):
@@ -164,13 +164,21 @@ class MotionCurves:
         It has the stated acceleration, against dry friction; NaN where nothing starts.
         """
         solution = self.solve_between()
-        _, senses = find_held(solution)
+        senses = find_starts(solution)
         starts = np.full(len(solution), np.nan)
         if (rows := np.flatnonzero(senses)).size:
             at = solution.at.part(rows)._replace(speed=_BEGINNING * senses[rows])
             name = read_drive_demand(solution).keys.value
             starts[rows] = solve(self.scene, at=at)[name]
         return starts
+
+    def read_demand(self, name: str) -> Array:
+        """Return a quantity of the drive, or what starts each position, (n,).
+
+        The positions are those of `solve_between`.
+        """
+        values: Array = self.solve_between()[name]
+        return np.where(np.isnan(self.starts), values, self.starts)
 
     @cached_property
     def start(self) -> Peak | None:

@@ -17,8 +17,8 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
 from fourbar.show.driving import (
     Driving,
-    find_held,
     is_once_round,
+    leaves_range,
     read_drive_demand,
 )
 from fourbar.show.duty import MotorDuty, motor_duty
@@ -209,12 +209,12 @@ class Facts:
         A turn that begins at such a position ends at the same, which is listed once.
         """
         solution = self.solution
-        rows = find_held(solution)[0]
+        rows = np.flatnonzero(leaves_range(solution))
         if self.drive is None or not len(rows):
             return []
         if not np.any(solution.at.speed):  # held between the positions too
             solution = self.motion.solve_between()
-            rows = find_held(solution)[0]
+            rows = np.flatnonzero(leaves_range(solution))
         low = getattr(solution, self.drive.keys.low)
         high = getattr(solution, self.drive.keys.high)
         places = solution.at.places
@@ -233,7 +233,7 @@ class Facts:
     @cached_property
     def is_held_at_rest(self) -> bool:
         """Return True if nothing moves where dry friction holds a pin."""
-        rows = find_held(self.solution)[0]
+        rows = np.flatnonzero(leaves_range(self.solution))
         return not np.any(self.solution.at.part(rows).speed)
 
     @cached_property

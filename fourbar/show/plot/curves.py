@@ -64,7 +64,9 @@ class Chart(NamedTuple):
     """Symbol at the upright axis."""
     unit: str
     curves: dict[str, tuple[Array, dict[str, Any]]]
-    """Values at the positions of the sweep, (n,), SI, and look, by the label."""
+    """Values at the positions of the sweep, (n,), SI, and look, by the label, or by the
+    name of a column whose look has the label.
+    """
     zero: str = "line"
     """A line at zero, the end of the axis there ("end"), or neither (""); an axis
     without zero is not clipped.

@@ -20,7 +20,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
-from fourbar.show.driving import find_held, leaves_range, read_drive_demand
+from fourbar.show.driving import lacks_friction, leaves_range, read_drive_demand
 from fourbar.show.plot.style import join_points, write_labelled_quantity
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
@@ -196,10 +196,10 @@ class View:
 
     def note_rest(self, solution: Solution) -> None:
         """Say where dry friction at rest is left out; at one position, its range."""
-        if not leaves_range(solution).any():
+        if not lacks_friction(solution).any():
             return
         text = "Dry friction at rest is taken as 0"
-        if len(solution) == 1 and len(find_held(solution)[0]):
+        if len(solution) == 1 and leaves_range(solution)[0]:
             drive = read_drive_demand(solution)
             low, high = (
                 write_labelled_quantity(solution[end][0], drive.unit, self.units)

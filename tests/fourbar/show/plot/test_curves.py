@@ -15,7 +15,7 @@ from fourbar import Friction, Gravity, Motion, Point, Sweep, solve
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
-from fourbar.show.plot.curves import CHARTS, draw_chart
+from fourbar.show.plot.curves import CHARTS, draw_chart, list_demand
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.view import make_view
 from tests.support.rows import read_rows
@@ -152,3 +152,10 @@ def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
     view = make_view(crank_rocker(motion=turn, drive_bar=4, effects=(friction,)))
     draw_chart(Figure().subplots(), view, CHARTS["drive"])
     assert re.search(r"evaluated, torque_(low|high)\s=\s", view.notes[-1])
+
+
+@pytest.mark.parametrize("acceleration, lines", [(0.0, 3), (3.0, 1)])
+def test_a_start_is_no_range_that_friction_holds(acceleration, lines):
+    rest = Motion(Sweep(0.5, 1.5, 20), 0.0, acceleration)
+    view = make_view(crank_rocker(motion=rest, effects=(Friction.at(O2=2.0),)))
+    assert len(list_demand(view).curves) == lines
