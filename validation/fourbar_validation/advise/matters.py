@@ -18,6 +18,7 @@ from fourbar.mjcf.document import (
 )
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
+from fourbar.show.panels import split_runs
 from fourbar.solving import solve
 from fourbar_validation.advise.worst_errors import (
     INFINITE_ERRORS,
@@ -143,8 +144,7 @@ def split_at_poles(scene: Scene, command: Command) -> list[slice]:
     A stretch has two positions or more.
     """
     far = np.flatnonzero(mark_far_from_poles(scene, command))
-    stretches = np.split(far, np.flatnonzero(np.diff(far) > 1) + 1)
-    return [slice(rows[0], rows[-1] + 1) for rows in stretches if len(rows) > 1]
+    return [slice(rows[0], rows[-1] + 1) for rows in split_runs(far) if len(rows) > 1]
 
 
 def measure_influences(

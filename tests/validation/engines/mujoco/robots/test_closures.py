@@ -454,7 +454,7 @@ def test_what_drives_a_loop_by_no_hinge_is_named(drive):
         more=f'{rope}</tendon><actuator><motor name="push" {drive}/></actuator>',
     )
     (chosen,) = loop_of(planar.text()).chosen
-    remark = "what drives it is on no hinge and is left out (the actuator push)"
+    remark = "what drives it is on no hinge (the actuator push)"
     assert chosen == f"{remark}: O2 is taken as driven (--drive states another)"
 
 

@@ -36,6 +36,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_body,
     name_joint,
     name_part,
+    takes_control,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
@@ -354,7 +355,7 @@ class _Finder:
         is_four = chain.pins == len(PINS)
         if [*chain.others.values()] == [BALL] and is_four and not is_skew:
             yield self._explain_ball(chain)
-        is_rigid = not chain.is_pin and 1 < chain.pins < len(PINS)
+        is_rigid = not chain.is_pin and chain.pins < len(PINS)
         if is_rigid and not is_skew and [*chain.others.values()] == [SLIDE]:
             yield self._explain_count(chain)
         for joint, kind in chain.others.items():
@@ -463,7 +464,10 @@ class _Finder:
         return largest, names
 
     def _explain_count(self, chain: _Chain) -> str:
-        """Say what another number of hinges makes, and what makes it a four-bar."""
+        """Say what another number of hinges makes, or a weld of few joints.
+
+        It is said too what makes it a four-bar.
+        """
         freedoms = chain.pins - 3
         count = write_count(chain.pins, "joint" if chain.others else "hinge")
         if freedoms <= 0:
@@ -610,13 +614,15 @@ class _Finder:
         """Describe the motors that move joints of a chain."""
         model = self.model
         data = self.data
-        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_tendon(model, data)
+        mujoco.mj_transmission(model, data)
         pulls = np.zeros((model.nu, model.nv))
         places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
         mujoco.mju_sparse2dense(pulls, data.actuator_moment, *places)
-        moving = pulls[:, model.jnt_dofadr[chain.joints]].any(axis=1)
-        motors = np.flatnonzero(model.actuator_gainprm.any(axis=1) & moving)
-        return ", ".join(describe_actuator(model, one) for one in motors.tolist())
+        dofs = model.jnt_dofadr[chain.joints]
+        moving = np.flatnonzero(pulls[:, dofs].any(axis=1)).tolist()
+        motors = (one for one in moving if takes_control(model, one))
+        return ", ".join(describe_actuator(model, one) for one in motors)
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.
@@ -763,7 +769,7 @@ class _Finder:
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
             elif pulling := self._describe_pulling(chain):
-                reason = f"what drives it is on no hinge and is left out ({pulling})"
+                reason = f"what drives it is on no hinge ({pulling})"
         elif len({*driven}) == 1:
             return chosen, []
         taken = f"{name_joint(model, chosen)} is taken as driven"
@@ -824,15 +830,15 @@ def _describe_offset(
 
     The list is empty where they lie in one plane.
     """
+    ends = (find_ends(posed.model, posed.data, number) for number in closures)
+    offset = max(abs(float((first - second) @ normal)) for first, second in ends)
+    if offset <= COINCIDENT_PINS * max(loop.lengths):
+        return []
     alone = copy_for_closures(posed.model, closures)
     alone.opt.disableflags |= find_bits("frictionloss")
     data = mujoco.MjData(alone)
     data.qpos[:] = posed.data.qpos
     mujoco.mj_forward(alone, data)
-    ends = (find_ends(alone, data, number) for number in closures)
-    offset = max(abs(float((first - second) @ normal)) for first, second in ends)
-    if offset <= COINCIDENT_PINS * max(loop.lengths):
-        return []
     total = np.sum([read_equality_force(data, one) for one in closures], axis=0)
     across = float(total @ normal)
     in_plane = float(np.linalg.norm(total - across * normal))

@@ -71,6 +71,33 @@ class PoseOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class MeasureOptions:
+    """Request for measurements of the loops of a robot."""
+
+    pose: PoseOptions
+    loop: str | None = None
+    """Name of a closure; None: all four-bars."""
+    speed: float | None = None
+    """Speed of the driven bar, rad/s; None: that of the scene."""
+    torque: float | None = None
+    """Torque of the motor under which the loop may come apart, N m. None: it is not
+    asked.
+    """
+    error: float | None = None
+    """Error for which settings are looked for; None: none are."""
+    span: tuple[float, float] | None = None
+    """Range of the driven joint, rad; None: that of the scene."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Bodies of the bars and sites of pin B that are stated, by their roles."""
+
+    def state_speed(self, scene: Scene) -> Scene:
+        """Return a scene at the speed that is stated, if one is."""
+        if self.speed is None:
+            return scene
+        return replace(scene, motion=scene.motion.replace(speed=self.speed))
+
+
+@dataclass(frozen=True, slots=True)
 class RobotLoop:
     """Planar four-bar in a robot's model; ids are those of MuJoCo's compiled model.
 
@@ -118,11 +145,10 @@ class RobotLoop:
     """Why its driven hinge is taken, where neither a motor nor an option tells."""
     remarks: tuple[str, ...] = ()
     read_lengths: tuple[float, ...] = ()
-    """Lengths of its scene, m; empty where they are its own without round-off. They
-    differ where the digits of the file cannot tell the linkage from one with a change
-    point.
+    """Lengths of its scene, m; empty until that is made. Beyond round-off they differ
+    from its own where the digits of the file cannot tell the linkage from one with a
+    change point.
     """
-
     turned: float = 0.0
     """Angle of the axes of its scene in the plane, with whole turns, rad."""
     from_other_end: "RobotLoop | None" = None
@@ -494,33 +520,6 @@ class SettingsAdvice:
     def reached(self) -> bool:
         """Tell whether the best combination is within the wanted error."""
         return self.best.error <= self.wanted
-
-
-@dataclass(frozen=True, slots=True)
-class MeasureOptions:
-    """Request for measurements of the loops of a robot."""
-
-    pose: PoseOptions
-    loop: str | None = None
-    """Name of a closure; None: all four-bars."""
-    speed: float | None = None
-    """Speed of the driven bar, rad/s; None: that of the scene."""
-    torque: float | None = None
-    """Torque of the motor under which the loop may come apart, N m. None: it is not
-    asked.
-    """
-    error: float | None = None
-    """Error for which settings are looked for; None: none are."""
-    span: tuple[float, float] | None = None
-    """Range of the driven joint, rad; None: that of the scene."""
-    names: Mapping[str, str] = field(default_factory=dict)
-    """Bodies of the bars and sites of pin B that are stated, by their roles."""
-
-    def state_speed(self, scene: Scene) -> Scene:
-        """Return a scene at the speed that is stated, if one is."""
-        if self.speed is None:
-            return scene
-        return replace(scene, motion=scene.motion.replace(speed=self.speed))
 
 
 @dataclass(frozen=True, slots=True)

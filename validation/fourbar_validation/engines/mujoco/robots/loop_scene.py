@@ -30,6 +30,7 @@ from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
+from fourbar.show.panels import split_runs
 from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -465,7 +466,7 @@ class SceneOfLoop(SeenLoop):
                 "no position is within the ranges of its hinges",
             )
         places = np.flatnonzero(free)
-        runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+        runs = split_runs(places)
         run = min(runs, key=lambda run: np.abs(run - in_pose).min())
         low, high = angles[run[[0, -1]]].tolist()
         start = max(low, min(near, high - math.tau))

@@ -24,6 +24,7 @@ from fourbar.mjcf.document import Drive
 from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, Motion
+from fourbar.show.panels import split_runs
 from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.description import Value
@@ -234,7 +235,7 @@ def _find_longest_run(states: InsideAnswer) -> Array:
     """Return the most angles in a row at which the loop closes, in their order."""
     angles = np.union1d(states.rows.angle, states.open)
     closed = np.flatnonzero(np.isin(angles, states.rows.angle))
-    runs = np.split(closed, np.flatnonzero(np.diff(closed) > 1) + 1)
+    runs = split_runs(closed)
     return np.asarray(angles[max(runs, key=len)])
 
 

@@ -312,7 +312,7 @@ def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
     `angles`: theta_1 to theta_4 of the loop, (n, 4), rad.
     """
     theta_1, theta_2, theta_3, theta_4 = np.transpose(angles)
-    branches = np.where(np.sin(theta_3 - theta_4) > 0.0, OPEN, CROSSED).astype(np.int8)
+    branches = np.where(np.sin(theta_4 - theta_3) > 0.0, OPEN, CROSSED).astype(np.int8)
     angle = theta_2 - theta_1 + scene.linkage.ground_angle
     circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
     return circuits

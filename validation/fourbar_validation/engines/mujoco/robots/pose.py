@@ -215,6 +215,8 @@ FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
 JOINT_UNITS = {HINGE_JOINT: "rad", SLIDE: "m"}
 CLOSED_IN_THE_FILE = 1e-9
 """m or rad; a smaller residual of the equalities is closed as far as a file can say."""
+_QUARTER_TURNS = (-0.5 * math.pi, 0.5 * math.pi)
+"""Turns of a hinge without limits from which closing is tried again, rad."""
 LARGEST_RESIDUAL = 1e-5
 """m or rad; a residual above this after closing is a loop that does not close."""
 MOST_NEWTON_STEPS = 100
@@ -407,20 +409,22 @@ class _Closing:
     def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,).
 
-        Each moves one joint to a quarter of its range; that of a hinge without limits
-        is a turn. Bars in line leave it: least squares alone do not. Fixed joints stay.
+        Each moves one joint: to a quarter, half or three quarters of its range, or a
+        hinge without limits by a quarter turn either way, since least squares keep bars
+        in line that are so. Fixed joints stay.
         """
         for joint in sorted({*self.tied} - fixed):
             place = self.model.jnt_qposadr[joint]
-            ends = (self.low[place], self.high[place])
-            is_hinge = self.model.jnt_type[joint] == HINGE_JOINT
-            if is_hinge and not self.model.jnt_limited[joint]:
-                ends = (-math.pi, math.pi)
-            if math.isfinite(ends[0]):
-                for value in np.linspace(*ends, 5)[1:-1]:
-                    start = stated.copy()
-                    start[place] = value
-                    yield start
+            values: list[float] = []
+            if math.isfinite(self.low[place]):
+                ends = (self.low[place], self.high[place])
+                values = np.linspace(*ends, 5)[1:-1].tolist()
+            elif self.model.jnt_type[joint] == HINGE_JOINT:
+                values = [stated[place] + turn for turn in _QUARTER_TURNS]
+            for value in values:
+                start = stated.copy()
+                start[place] = value
+                yield start
 
     def close(self, start: Array, fixed: set[int]) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,).
