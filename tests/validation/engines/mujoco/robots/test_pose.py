@@ -101,9 +101,10 @@ def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
 
 @pytest.mark.slow
 def test_a_loop_closes_beside_the_turns_that_its_pose_counts():
-    turned = '<keyframe><key name="turned" qpos="25.13 0 0"/></keyframe></mujoco>'
-    posed = pose(STRETCHED.replace("</mujoco>", turned), "turned")
-    assert posed.data.qpos[0] == approx(25.13, abs=2.0)
+    key = f'<key name="turned" qpos="{8.0 * math.pi!r} 0 0"/>'
+    text = STRETCHED.replace("</mujoco>", f"<keyframe>{key}</keyframe></mujoco>")
+    posed = pose(text, "turned")
+    assert posed.data.qpos[0] == approx(8.0 * math.pi, abs=2.0)
 
 
 def test_a_stated_joint_stays_and_the_loop_closes_around_it():
