@@ -56,8 +56,9 @@ REPEATED = (
 to refuse n of them.
 """
 ENDS = ("", "!", "^", "\n", "0^", ")")
-LENGTHS = (8, 12, 16, 20, 24, 60, 600)
-"""Characters. The short texts come first, so that a bad pattern is named within the
+LENGTHS = (8, 12, 16, 20, 24, 28, 32, 60, 600)
+"""Characters. The short texts come first and grow by four, by which an exponential
+pattern takes 16 times as long, so that a bad one is named on any machine within the
 time of the test.
 """
 SECONDS = 0.25
