@@ -620,9 +620,12 @@ class _Finder:
         places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
         mujoco.mju_sparse2dense(pulls, data.actuator_moment, *places)
         dofs = model.jnt_dofadr[chain.joints]
-        moving = np.flatnonzero(pulls[:, dofs].any(axis=1)).tolist()
-        motors = (one for one in moving if takes_control(model, one))
-        return ", ".join(describe_actuator(model, one) for one in motors)
+        pulling = np.flatnonzero(pulls[:, dofs].any(axis=1)).tolist()
+        return ", ".join(
+            describe_actuator(model, one)
+            for one in pulling
+            if takes_control(model, one)
+        )
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.

@@ -215,7 +215,7 @@ FREE_JOINT, BALL, SLIDE, HINGE_JOINT = (
 JOINT_UNITS = {HINGE_JOINT: "rad", SLIDE: "m"}
 CLOSED_IN_THE_FILE = 1e-9
 """m or rad; a smaller residual of the equalities is closed as far as a file can say."""
-_QUARTER_TURNS = (-0.5 * math.pi, 0.5 * math.pi)
+_QUARTER_TURNS = 0.5 * math.pi * np.array([-1.0, 1.0])
 """Turns of a hinge without limits from which closing is tried again, rad."""
 LARGEST_RESIDUAL = 1e-5
 """m or rad; a residual above this after closing is a loop that does not close."""
@@ -420,7 +420,7 @@ class _Closing:
                 ends = (self.low[place], self.high[place])
                 values = np.linspace(*ends, 5)[1:-1].tolist()
             elif self.model.jnt_type[joint] == HINGE_JOINT:
-                values = [stated[place] + turn for turn in _QUARTER_TURNS]
+                values = (stated[place] + _QUARTER_TURNS).tolist()
             for value in values:
                 start = stated.copy()
                 start[place] = value
