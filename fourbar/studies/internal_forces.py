@@ -121,64 +121,57 @@ class _Beam(NamedTuple):
     density: float
     """Mass per length of a uniform bar, kg/m; otherwise 0."""
     pull: ComplexArray
-    """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n,)."""
+    """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n, 1)."""
     omega: Array
+    """rad/s, (n, 1)."""
     alpha: Array
+    """rad/s^2, (n, 1)."""
 
-    def at(self, x: Array, *, before: bool = False) -> tuple[Array, Array, Array]:
+    def at(self, x: Array, side: float = 1.0) -> tuple[Array, Array, Array]:
         """Compute N, V, M at x, (n, k).
 
-        `before`: without what acts at x itself.
+        `side`: -1: without what acts at x itself.
         """
-        end = x + (-SAME_FOOT if before else SAME_FOOT) * self.length
         foot = self.foot[:, :, None]
-        acts = foot < end[:, None]
+        acts = foot < (x + side * SAME_FOOT * self.length)[:, None]
         force = np.where(acts, self.force[:, :, None], 0.0)
         couple = np.where(acts, self.couple[:, :, None], 0.0)
-        arm = x[:, None] - foot
         s = np.clip(x, 0.0, self.length)
-        rest = np.maximum(x - self.length, 0.0)
-        along = self.pull.real[:, None]
-        across = self.pull.imag[:, None]
-        square = np.square(self.omega[:, None])
-        alpha = self.alpha[:, None]
-        stretched = self.density * s * (along - 0.5 * square * s)
+        across = self.pull.imag
+        alpha = self.alpha
+        stretched = self.density * s * (self.pull.real - 0.5 * self.omega**2 * s)
         sheared = -self.density * s * (across + 0.5 * alpha * s)
         bent = -self.density * np.square(s) * (0.5 * across + alpha * s / 6.0)
+        bent = bent + sheared * np.maximum(x - self.length, 0.0)
+        moments = force.imag * (x[:, None] - foot) - couple
         return (
             (0.0 - force.real.sum(axis=1)) + stretched,
             force.imag.sum(axis=1) + sheared,
-            (force.imag * arm - couple).sum(axis=1) + (bent + sheared * rest),
+            moments.sum(axis=1) + bent,
         )
 
     def find_largest(self) -> Bending:
         """Find the largest |M|: at a foot, on either side of it, or where V = 0."""
-        n = len(self.foot)
-        ends = np.broadcast_to([0.0, self.length], (n, 2))
+        ends = np.broadcast_to([0.0, self.length], (len(self.foot), 2))
         feet = np.sort(np.concatenate([self.foot, ends], axis=1), axis=1)
         places = [feet, feet]
-        moments = [self.at(feet)[2], self.at(feet, before=True)[2]]
+        moments = [self.at(feet)[2], self.at(feet, -1.0)[2]]
         if self.density > 0.0:
-            across = self.pull.imag[:, None]
-            bend = 0.5 * self.alpha[:, None]
+            across = self.pull.imag
+            bend = 0.5 * self.alpha
             spread = feet * (across + bend * feet)
             single = self.at(feet)[1] / self.density + spread  # forces at feet only
-            roots = _solve_stable_quadratic(bend, across, -single)
-            before = np.maximum(feet, 0.0)
-            after = np.minimum(
-                np.append(feet[:, 1:], feet[:, -1:], axis=1), self.length
-            )
-            for root in roots:
-                inside = (root > before) & (root < after)
-                places.append(np.where(inside, root, feet))
-                moments.append(np.where(inside, self.at(places[-1])[2], 0.0))
+            inside = np.clip(feet, 0.0, self.length)
+            after = np.append(inside[:, 1:], inside[:, -1:], axis=1)
+            for root in _solve_stable_quadratic(bend, across, -single):
+                places.append(np.clip(np.nan_to_num(root), inside, after))
+                moments.append(self.at(places[-1])[2])
         x = np.concatenate(places, axis=1)
         M = np.concatenate(moments, axis=1)
-        finite = np.isfinite(M).all(axis=1)
-        worst = np.argmax(np.nan_to_num(np.abs(M), nan=-1.0), axis=1)
-        rows = np.arange(n)
-        moment = np.where(finite, M[rows, worst], np.nan)
-        return Bending(moment, np.where(finite, x[rows, worst], np.nan))
+        # where one is NaN, that one counts as the largest
+        worst = np.arange(len(M)), np.argmax(np.abs(M), axis=1)
+        moment = np.where(np.isfinite(M[worst]), M[worst], np.nan)
+        return Bending(moment, np.where(np.isfinite(moment), x[worst], np.nan))
 
 
 def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
@@ -243,7 +236,11 @@ class _Recorder(Actions):
 def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
     """Collect all that acts on a bar."""
     described = scene.linkage.bar(bar)
-    n = len(solution)
+    G = described.to_centre
+    uniform = described.inertia is None and described.centre is None
+    zero = np.zeros(len(solution))
+    omega = zero + getattr(solution, f"omega_{bar}")
+    alpha = zero + getattr(solution, f"alpha_{bar}")
     with np.errstate(all="ignore"):
         case = Case.of(scene, solution.at.bar).begin_with(solution.at)
         state = case.at(solution.at)
@@ -251,7 +248,6 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
         _record_drive(recorder, scene, solution)
         gravity = 0.0j
         back = np.conj(state.direction(bar))
-        uniform = described.inertia is None and described.centre is None
         terms: tuple[Any, ...] = case.terms
         pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
         for term in terms:
@@ -259,32 +255,27 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
                 gravity = gravity + term.field
                 continue
             if term.key == "load" and term.bar == bar:
-                recorder.place = term.foot(described.to_centre)
+                recorder.place = term.foot(G)
                 if term.arm is not None:
                     recorder.place = recorder.place + polar(*term.arm) * back
             term.act(recorder, state)
             recorder.place = 0.0j
             term.act_known(recorder, pin_forces)
-        pull: Any = -gravity
-        if bar == 3:
-            pull = _join(solution.a_A) + pull
-        omega = np.zeros(n) + getattr(solution, f"omega_{bar}")
-        alpha = np.zeros(n) + getattr(solution, f"alpha_{bar}")
-        for term in terms:  # a flywheel turns about the bar's ground pin
-            if bar in term.added_inertia:
-                recorder.items.append((0.0j, 0.0j, -term.added_inertia[bar] * alpha))
-        G = described.to_centre
+            if bar in term.added_inertia:  # a flywheel turns about the ground pin
+                recorder.couple(bar, -term.added_inertia[bar] * alpha)
+        pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
         of_mass = -described.mass * (_join(getattr(solution, f"a_G{bar}")) - gravity)
-        inertial = [
-            (G, of_mass * back, 0.0),
-            (G, 0.0j, -described.moment_of_inertia * alpha),
-        ]
-        supports = _support(recorder, inertial, solution)
-        acting = [*recorder.items, *supports]
+        inertial = [(G, of_mass * back, -described.moment_of_inertia * alpha)]
+        acting = recorder.items + _support(recorder, inertial, solution)
         if not uniform:
             acting += inertial
-        foot, force, couple = _sum_by_foot(
-            acting, np.zeros(n), SAME_FOOT * described.length
+        columns = []
+        for place, force, couple in acting:
+            # with the couple of a force beside the line
+            beside = couple + cross(-force, 1j * np.imag(place))
+            columns.append(np.broadcast_arrays(np.real(place), force, beside, zero))
+        foot, force, couple, _ = (
+            np.stack(column, axis=1) for column in zip(*columns, strict=True)
         )
         density = described.mass / described.length if uniform else 0.0
         return _Beam(
@@ -294,38 +285,10 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
             couple,
             uniform,
             density,
-            pull * back,
-            omega,
-            alpha,
+            (pull * back)[:, None],
+            omega[:, None],
+            alpha[:, None],
         )
-
-
-def _sum_by_foot(
-    items: list[_Item],
-    zero: Array,
-    same: float,
-) -> tuple[Array, ComplexArray, Array]:
-    """Sum what acts at the same foot at every position.
-
-    Feet, forces and couples are (n, f) each.
-    """
-    feet = list[Array]()
-    forces = list[Any]()
-    couples = list[Array]()
-    for place, force, couple in items:
-        foot = zero + np.real(place)
-        # the couple of a force beside the line
-        beside = couple + cross(-force, 1j * np.imag(place))
-        k = 0
-        while k < len(feet) and (np.abs(feet[k] - foot) > same).any():
-            k += 1
-        if k == len(feet):
-            feet.append(foot)
-            forces.append(0.0j * zero)
-            couples.append(zero)
-        forces[k] = forces[k] + force
-        couples[k] = couples[k] + beside
-    return np.stack(feet, axis=1), np.stack(forces, axis=1), np.stack(couples, axis=1)
 
 
 def _support(
