@@ -71,18 +71,6 @@ def signature(thing: Any) -> str:
     A description has its fields as arguments.
     """
     node = parse(thing.fget if isinstance(thing, property) else thing)
-    constructors = [
-        part
-        for part in getattr(node, "body", ())
-        if getattr(part, "name", "") == "__init__"
-    ]
-    if hasattr(thing, "__dataclass_fields__") and constructors:
-        names, defaults = constructors[0].args.args[1:], constructors[0].args.defaults
-        pairs = zip(names, defaults, strict=True)
-        fields = [
-            f"{ast.unparse(name)} = {ast.unparse(value)}" for name, value in pairs
-        ]
-        return f"({', '.join(fields)})"
     if isinstance(node, ast.ClassDef):
         arguments = [
             ast.unparse(_without_declaration(statement, thing)).replace(

@@ -5,9 +5,7 @@ A command is one of angles, a sweep, a limit position, a law over time, and rele
 
 import math
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from itertools import accumulate
 from typing import Annotated, Any, ClassVar
@@ -34,6 +32,7 @@ from fourbar.linkage import (
     Whole,
     require,
     require_numbers,
+    require_whole,
 )
 from fourbar.quantities import Array
 
@@ -49,12 +48,10 @@ COMMAND_NAMES = {
     bar: (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}") for bar in MOVING_BARS
 }
 """Names of the commanded angle, speed and acceleration by bar."""
-_NAMES_OF_BARS = tuple(name for names in COMMAND_NAMES.values() for name in names)
 BAR_OF_ANGLE = {names[0]: bar for bar, names in COMMAND_NAMES.items()}
 STROKE_COMMAND = ("stroke", "stroke_speed", "stroke_acceleration")
 """Names of the commanded stroke, speed and acceleration of a cylinder."""
-_FIELDS_OF_NUMBERS = ("angle", "speed", "acceleration")
-"""Fields of a motion that hold the numbers of its command."""
+_COMMANDS = (*COMMAND_NAMES.values(), STROKE_COMMAND)
 SIDES = {"left": 1.0, "right": -1.0}
 """Signs of the side on which the moving end of a cylinder lies. The line runs from the
 bar's pivot to the end on the ground, and is seen towards the latter.
@@ -87,29 +84,17 @@ LAW_KINDS = (*RISE_LAWS, SINE_LAW)
 class Sweep:
     """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals.
 
-    Both ends are included. A sweep of the stroke has lengths in place of angles, m.
+    Both ends are included. A sweep of the stroke has lengths in place of angles, m. The
+    motion reads ends that are texts with units.
     """
 
     start: float
     stop: float
     steps: int
-    unit: str | None = field(default=None, init=False, compare=False, repr=False)
-    """SI unit of ends that were texts: "rad" or "m"; None: numbers have none."""
 
     def __post_init__(self) -> None:
-        ends = self.start, self.stop
-        unit = "m" if is_length(*ends) else "rad"
-        start = require("motion.theta_2.from", self.start, unit)
-        stop = require("motion.theta_2.to", self.stop, unit)
-        if not math.isfinite(stop - start):
-            allowed = f"must be within the range of doubles from {start!r}"
-            raise InputError("motion.theta_2.to", stop, allowed)
         steps = STEPS.check("motion.theta_2.steps", self.steps)
-        stated = unit if any(isinstance(end, str) for end in ends) else None
-        checked = {"start": start, "stop": stop, "steps": steps, "unit": stated}
-        for name, value in checked.items():
-            # the class is frozen; this is its constructor
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "steps", steps)  # the class is frozen
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,21 +121,24 @@ class Free(Described):
     stated_at: ClassVar[str] = "motion.free"
 
 
-def _find_bar(key: str, numbers: Mapping[str, Any]) -> int | None:
-    """Return the bar of which numbers are stated by name, or None.
+def _find_command(key: str, stated: Any) -> tuple[str, str, str] | None:
+    """Return the names of the command whose numbers a motion or a law states, or None.
 
-    Raises InputError for two bars.
+    Raises InputError for numbers of two commands.
     """
-    first = ""
-    for name, number in numbers.items():
-        rests = name.startswith("alpha") and type(number) is float and not number
-        if number is None or rests:
-            continue
-        first = first or name
-        if name[-1] != first[-1]:
-            allowed = f"{first} commands bar {first[-1]}; one bar is commanded"
-            raise InputError(f"{key}.{name}", number, allowed)
-    return int(first[-1]) if first else None
+    found = None
+    for names in _COMMANDS:
+        for name in names:
+            number = getattr(stated, name, None)
+            rests = name == names[2] and type(number) is float and not number
+            if number is None or rests:
+                continue
+            if found not in (None, names):
+                others = ", ".join(found)
+                allowed = f"must be left out beside {others}: one bar is commanded"
+                raise InputError(f"{key}.{name}", number, allowed)
+            found = names
+    return found
 
 
 class _OverTime:
@@ -161,8 +149,8 @@ class _OverTime:
     @property
     def bar(self: Any) -> int:
         """Number of the bar whose angle the law gives: 2, 3 or 4."""
-        stated = {name: getattr(self, name, None) for name in _NAMES_OF_BARS}
-        return _find_bar("motion.law", stated) or 2
+        names = _find_command("motion.law", self) or COMMAND_NAMES[2]
+        return BAR_OF_ANGLE[names[0]]
 
     @property
     def angle(self: Any) -> Any:
@@ -423,8 +411,13 @@ def _fit_rates(time: tuple[float, ...], *values: tuple[float, ...]) -> Any:
     return BPoly.from_derivatives(np.array(time), np.stack(values, axis=1))
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
-class Motion:
+_Places = Annotated[Any, Declared("rad")]
+_Rate = Annotated[Any, Declared("rad/s")]
+_Growth = Annotated[Any, Declared("rad/s^2")]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion(Described):
     """The command to one moving bar, the input unless numbers of bar 3 or 4 are stated.
 
     Numbers may be texts with units instead, like "60 rpm".
@@ -454,145 +447,119 @@ class Motion:
         on the bar lies.
     """
 
-    commanded: str
-    """Name of what is commanded: "theta_2", "theta_3", "theta_4" or "stroke"."""
-    bar: int
+    theta_2: _Places = None
+    omega_2: _Rate = None
+    alpha_2: _Growth = 0.0
+    branch: int = OPEN
+    """Assembly, +1 open or -1 crossed."""
+    free: Free | None = None
+    law: Law | Rise | Sine | None = None
+    theta_3: _Places = None
+    omega_3: _Rate = None
+    alpha_3: _Growth = 0.0
+    theta_4: _Places = None
+    omega_4: _Rate = None
+    alpha_4: _Growth = 0.0
+    stroke: Annotated[Any, Declared("m")] = None
+    stroke_speed: Annotated[Any, Declared("m/s")] = None
+    stroke_acceleration: Annotated[Any, Declared("m/s^2")] = 0.0
+    side: str | None = None
+    names: tuple[str, str, str] = field(repr=False, init=False)
+    """Names of the commanded position, speed and acceleration."""
+    bar: int = field(repr=False, compare=False, init=False)
     """Number of the commanded bar, 2, 3 or 4. If a stroke is commanded, the scene's
     drive determines it.
     """
-    angle: float | Array | Sweep | FromLimit | None
-    """Commanded angle, rad, or stroke, m, as it is stated."""
-    speed: float | Array | None
-    """Commanded speed, rad/s, or m/s of a stroke; (n,) if each angle has its own."""
-    acceleration: float | Array
-    """Commanded acceleration, rad/s^2, or m/s^2 of a stroke; likewise."""
-    branch: int
-    """Assembly, +1 open or -1 crossed."""
-    free: Free | None
-    law: Law | Rise | Sine | None
-    side: str | None
-    numbers: ClassVar[dict[str, Declared]] = {
-        name: Declared(f"{unit}{per}")
-        for unit, commands in (("rad", COMMAND_NAMES.values()), ("m", [STROKE_COMMAND]))
-        for names in commands
-        for name, per in zip(names, ("", "/s", "/s^2"), strict=True)
-    }
 
-    def __init__(  # noqa: PLR0913 - the keywords of a command, of any bar
-        self,
-        theta_2: float | Array | Sweep | FromLimit | None = None,
-        omega_2: float | Array | None = None,
-        alpha_2: float | Array = 0.0,
-        branch: int = OPEN,
-        free: Free | None = None,
-        law: Law | Rise | Sine | None = None,
-        theta_3: float | Array | Sweep | FromLimit | None = None,
-        omega_3: float | Array | None = None,
-        alpha_3: float | Array = 0.0,
-        theta_4: float | Array | Sweep | FromLimit | None = None,
-        omega_4: float | Array | None = None,
-        alpha_4: float | Array = 0.0,
-        stroke: float | Array | Sweep | None = None,
-        stroke_speed: float | Array | None = None,
-        stroke_acceleration: float | Array = 0.0,
-        side: str | None = None,
-    ) -> None:
-        given: dict[str, Any] = {
-            "theta_2": theta_2,
-            "omega_2": omega_2,
-            "alpha_2": alpha_2,
-            "theta_3": theta_3,
-            "omega_3": omega_3,
-            "alpha_3": alpha_3,
-            "theta_4": theta_4,
-            "omega_4": omega_4,
-            "alpha_4": alpha_4,
-            "stroke": stroke,
-            "stroke_speed": stroke_speed,
-            "stroke_acceleration": stroke_acceleration,
-        }
+    def __post_init__(self) -> None:
+        stated = _find_command("motion", self)
+        law = self.law
         expect("motion.law", law, Law, Rise, Sine, type(None))
-        of_bars = {name: given[name] for name in _NAMES_OF_BARS}
-        stated = _find_bar("motion", of_bars)
-        bar = (stated or 2) if law is None else law.bar
-        names = COMMAND_NAMES[bar]
-        if stroke is not None or side is not None or stroke_speed is not None:
-            if stroke is None:
+        expect("motion.free", self.free, Free, type(None))
+        if stated == STROKE_COMMAND or self.side is not None:
+            if self.stroke is None:
                 allowed = "is missing: side and stroke_speed are of a stroke"
                 raise InputError("motion.stroke", None, allowed)
-            if stated is not None or law is not None or free is not None:
-                allowed = "is commanded alone: no angle, law or release besides"
-                raise InputError("motion.stroke", stroke, allowed)
-            names = STROKE_COMMAND
-            given["stroke"] = _require_strokes(stroke)
-            if not isinstance(side, str) or side not in SIDES:
-                allowed = 'must be "left" or "right", as a stroke has two angles'
-                raise InputError("motion.side", side, allowed)
-        if law is not None and (stated is not None or free is not None):
-            allowed = f"stands alone: it gives {', '.join(names[:2])} and {names[2]}"
+            OneOf((*SIDES,)).check("motion.side", self.side)
+            if self.free is not None:
+                allowed = "is commanded alone: no release besides"
+                raise InputError("motion.stroke", self.stroke, allowed)
+        names = stated or COMMAND_NAMES[2 if law is None else law.bar]
+        if law is not None and (stated or self.free is not None):
+            of_law = COMMAND_NAMES[law.bar]
+            allowed = f"stands alone: it gives {', '.join(of_law[:2])} and {of_law[2]}"
             raise InputError("motion.law", "a law", allowed)
+        branch: Any = self.branch
         if isinstance(branch, str):
             branch = BRANCH_OF_NAME.get(branch, branch)
-        checked = _require_command(names, *(given[name] for name in names))
-        expect("motion.branch", branch, int, np.integer, str)
-        expect("motion.free", free, Free, type(None))
-        if branch not in (OPEN, CROSSED):
-            raise InputError("motion.branch", branch, A_BRANCH)
-        values = (names[0], bar, *checked, branch, free, law, side)
-        for name, value in zip(self.__slots__, values, strict=True):
+        checked = {
+            **dict(zip(names, self._check(names), strict=True)),
+            "branch": require_whole("motion.branch", branch, BRANCH_NAMES, A_BRANCH),
+            "names": names,
+            "bar": BAR_OF_ANGLE.get(names[0], 2),
+        }
+        for name, value in checked.items():
             # the class is frozen; this is its constructor
             object.__setattr__(self, name, value)
 
-    def __getattr__(self, name: str) -> Any:
-        """Return a number of the command by its name, like theta_2 or stroke_speed.
+    def _check(self, names: tuple[str, str, str]) -> tuple[Any, Any, Any]:
+        """Return the numbers of the command of these names, checked."""
+        units = [Motion.numbers[name].unit for name in names]
+        theta, omega, alpha = (f"motion.{name}" for name in names)
+        angle, speed, acceleration = (getattr(self, name) for name in names)
+        angle = _require_places(theta, angle, units[0])
+        if speed is not None:
+            speed = _require_rates(omega, speed, units[1], angle)
+            highest = float(np.max(np.abs(speed)))
+            if not math.isfinite(highest * highest):
+                fastest = write_in_units(units[1], LARGEST_SPEED)
+                allowed = f"must be below {fastest}: every acceleration has its square"
+                raise InputError(omega, highest, allowed, unit=units[1])
+        return angle, speed, _require_rates(alpha, acceleration, units[2], angle)
 
-        The number is None (an acceleration: 0) if the command has another name.
+    @property
+    def commanded(self) -> str:
+        """Name of what is commanded: "theta_2", "theta_3", "theta_4" or "stroke"."""
+        return self.names[0]
+
+    @property
+    def angle(self) -> Any:
+        """Commanded angle, rad, or stroke, m, as it is stated."""
+        return getattr(self, self.names[0])
+
+    @property
+    def speed(self) -> Any:
+        """Commanded speed, rad/s, or m/s of a stroke; (n,) if each angle has its own.
+
+        None: positions only.
         """
-        if name not in Motion.numbers:
-            raise AttributeError(f"a motion has no {name!r}")
-        if name in self.names:
-            return getattr(self, _FIELDS_OF_NUMBERS[self.names.index(name)])
-        return 0.0 if name.startswith("alpha") or "acceleration" in name else None
+        return getattr(self, self.names[1])
+
+    @property
+    def acceleration(self) -> Any:
+        """Commanded acceleration, rad/s^2, or m/s^2 of a stroke; likewise."""
+        return getattr(self, self.names[2])
 
     def replace(self, **changes: Any) -> "Motion":
         """Return a copy with other values of fields.
 
-        Fields are angle, speed, acceleration, branch, free, law and side. The first
-        three are those of what this motion commands, a bar or a stroke.
+        Besides the constructor's keywords, angle, speed and acceleration are those of
+        what this motion commands, a bar or a stroke.
         """
-        keywords = dict(zip(_FIELDS_OF_NUMBERS, self.names, strict=True))
-        keywords |= {name: name for name in ("branch", "free", "law", "side")}
-        if foreign := changes.keys() - keywords:
-            allowed = f"it has {', '.join(keywords)}"
-            raise TypeError(
-                f"a motion has no field {min(foreign)!r} to replace; {allowed}"
-            )
-        return Motion(
-            **{
-                keyword: changes.get(name, getattr(self, name))
-                for name, keyword in keywords.items()
-            }
-        )
+        names = dict(zip(("angle", "speed", "acceleration"), self.names, strict=True))
+        keywords = {names.get(name, name): value for name, value in changes.items()}
+        return replace(self, **keywords)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Motion):
-            return NotImplemented
-        return self._list_fields() == other._list_fields()
+        return isinstance(other, Motion) and self._list_values() == other._list_values()
 
     def __hash__(self) -> int:
-        return hash(self._list_fields())
+        return hash(self._list_values())
 
-    def _list_fields(self) -> tuple[object, ...]:
-        """List the fields, arrays as tuples; the bar of a stroke is the scene's."""
-        numbers = (self.angle, self.speed, self.acceleration)
-        return (
-            self.names,
-            *(tuple(x) if isinstance(x, np.ndarray) else x for x in numbers),
-            self.side,
-            self.branch,
-            self.free,
-            self.law,
-        )
+    def _list_values(self) -> tuple[object, ...]:
+        """List what motions are compared by, arrays as tuples."""
+        values = (getattr(self, one.name) for one in fields(self) if one.compare)
+        return tuple(tuple(x) if isinstance(x, np.ndarray) else x for x in values)
 
     @property
     def has_rate_of_each(self) -> bool:
@@ -606,99 +573,53 @@ class Motion:
         Raises InputError for a place without rates, where each angle has its own.
         """
         rates = self.speed, self.acceleration
-        if not self.has_rate_of_each or np.array_equal(places, self.angle):  # type: ignore[arg-type]
+        if not self.has_rate_of_each or np.array_equal(places, self.angle):
             return rates
-        angles: Any = self.angle
-        order = np.argsort(angles)
-        found = np.searchsorted(angles, places, sorter=order)
-        index = order[np.minimum(found, len(angles) - 1)]
-        same = angles[index] == places
-        if not same.all():
-            _, omega, alpha = self.names
+        rows = dict(zip(self.angle.tolist(), range(len(self.angle)), strict=True))
+        chosen: Any = [*map(rows.get, places.tolist())]
+        if None in chosen:
             raise InputError(
-                f"motion.{omega if isinstance(self.speed, np.ndarray) else alpha}",
-                f"{len(angles)} numbers",
+                f"motion.{self.names[1 if isinstance(self.speed, np.ndarray) else 2]}",
+                f"{len(self.angle)} numbers",
                 "are those of the stated positions: no other has one",
             )
         speed, acceleration = (
-            rate[index] if isinstance(rate, np.ndarray) else rate for rate in rates
+            rate[chosen] if isinstance(rate, np.ndarray) else rate for rate in rates
         )
-        return speed, 0.0 if acceleration is None else acceleration
-
-    @property
-    def names(self) -> tuple[str, str, str]:
-        """Names of the commanded position, speed and acceleration.
-
-        A motion commands bar 2, 3 or 4, or the stroke.
-        """
-        if self.commanded == "stroke":
-            return STROKE_COMMAND
-        return COMMAND_NAMES[self.bar]
+        return speed, acceleration
 
 
-def is_length(*values: object) -> bool:
-    """Return True if a text among the values states a length."""
-    for value in values:
-        if isinstance(value, str):
-            with suppress(InputError):
-                require("motion.stroke", value, "m")
-                return True
-    return False
-
-
-def _require_strokes(stroke: Any) -> Any:
-    """Return the strokes, checked; InputError for what is no length above zero."""
-    if isinstance(stroke, Sweep):
-        ends = np.array([stroke.start, stroke.stop])
+def _require_places(key: str, stated: Any, unit: str) -> Any:
+    """Return commanded angles, or strokes above 0, checked."""
+    if stated is None or (isinstance(stated, FromLimit) and unit == "rad"):
+        return stated
+    if isinstance(stated, Sweep):
+        start = require(f"{key}.from", stated.start, unit)
+        stop = require(f"{key}.to", stated.stop, unit)
+        if not math.isfinite(stop - start):
+            allowed = f"must be within the range of doubles from {start!r}"
+            raise InputError(f"{key}.to", stop, allowed)
+        places = np.array([start, stop])
+        stated = Sweep(start, stop, stated.steps)
     else:
-        stroke = require_numbers("motion.stroke", stroke, "must be finite lengths", "m")
-        ends = stroke
-    least = float(ends.min(initial=math.inf))
-    if not least > 0.0:
-        raise InputError("motion.stroke", least, "must be above 0", unit="m")
-    return stroke
-
-
-def _require_command(
-    names: tuple[str, str, str],
-    angle: Any,
-    speed: Any,
-    acceleration: Any,
-) -> tuple[Any, Any, Any]:
-    """Return angle, speed and acceleration of the command of these names, checked."""
-    unit, per_second, growth = (Motion.numbers[name].unit for name in names)
-    theta, omega, alpha = (f"motion.{name}" for name in names)
-    if isinstance(angle, Sweep):
-        if angle.unit not in (None, unit):
-            stated = f"from {angle.start:g} to {angle.stop:g} {angle.unit}"
-            raise InputError(theta, stated, f"must be in {unit}")
-    elif angle is not None and not isinstance(angle, FromLimit):
-        angles = require_numbers(theta, angle, "must be finite angles", unit)
-        if angles.size == 0:
-            raise InputError(theta, angle, "must be one angle or more")
-        angles.flags.writeable = False
-        angle = float(angles) if angles.ndim == 0 else angles
-    if speed is not None:
-        speed = _require_rates(omega, speed, per_second, angle)
-        highest = float(np.max(np.abs(speed)))
-        if not math.isfinite(highest * highest):
-            fastest = write_in_units(per_second, LARGEST_SPEED)
-            allowed = f"must be below {fastest}: every acceleration has its square"
-            raise InputError(omega, highest, allowed, unit=per_second)
-    return angle, speed, _require_rates(alpha, acceleration, growth, angle)
+        places = require_numbers(key, stated, unit=unit)
+        if places.size == 0:
+            raise InputError(key, stated, "must be one position or more")
+        places.flags.writeable = False
+        stated = float(places) if places.ndim == 0 else places
+    if unit == "m" and not places.min() > 0.0:
+        raise InputError(key, float(places.min()), "must be above 0", unit=unit)
+    return stated
 
 
 def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array:
     """Return one rate, or an array of one for each angle, checked."""
-    if not isinstance(rates, (list, tuple)) and np.ndim(rates) == 0:
-        return require(key, rates, unit)
     array = require_numbers(key, rates, unit=unit)
-    allowed = ""
-    if not isinstance(angle, np.ndarray):
-        allowed = "must be one number, unless positions are stated one by one"
-    elif len(array) != len(angle):
-        allowed = f"must be one number, or {len(angle)}: one for each position"
-    if allowed:
+    if array.ndim == 0:
+        return float(array)
+    listed = len(angle) if isinstance(angle, np.ndarray) else 0
+    if len(array) != listed:
+        allowed = f"must be one number, or one for each listed position: {listed}"
         raise InputError(key, f"{len(array)} numbers", allowed)
     array.flags.writeable = False
     return array

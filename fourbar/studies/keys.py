@@ -189,11 +189,10 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     entries = lengths | of_ground | bars
     motion = scene.motion
     if motion.law is None:
-        _, omega, alpha = motion.names
-        for field, name in (("speed", omega), ("acceleration", alpha)):
-            if np.ndim(getattr(motion, field)) == 0:  # not one for each angle
+        for name in motion.names[1:]:
+            if np.ndim(getattr(motion, name)) == 0:  # not one for each angle
                 unit = motion.numbers[name].unit
-                entries[f"motion.{name}"] = SceneNumber(("motion", field), unit)
+                entries[f"motion.{name}"] = SceneNumber(("motion", name), unit)
     for key, path, described in list_described(scene):
         entries |= _list_entries(key, path, described)
     if scene.drawing is None:

@@ -247,7 +247,7 @@ def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused():
     large = FourBar(4e307, *[Bar(4e307)] * 3)
     assert solved(Scene(large, Motion(1.0, 1e-200))).status == ["ok"]
     with raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
-        Sweep(-1e308, 1e308, 3)
+        Motion(Sweep(-1e308, 1e308, 3))
 
 
 def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():

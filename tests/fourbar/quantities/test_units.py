@@ -12,7 +12,7 @@ import pytest
 from pytest import raises
 
 import fourbar
-from fourbar import InputError, Load, Place, Spring
+from fourbar import InputError, Load, Motion, Place, Spring, Sweep
 from fourbar.quantities.units import UnitError, half_unit_of_text, to_si
 from tests.support.rows import read_rows
 
@@ -20,9 +20,9 @@ ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
 STATED = read_rows("""
 Bar | ["9 cm", "2 g", "2 g m^2", ["5 cm", "180 deg"]] | [0.09, 0.002, 0.002, [0.05, PI]]
 uniform | ["6 in", 0.05, "127 mm", "4 in"] | [0.1524, 0.05, 0.127, 0.1016]
-Sweep | ["180 deg", "2 rad", 4] | [PI, 2.0, 4]
 FromLimit | [1, "180 deg"] | [1, PI]
 Free | ["0.5 min", 4] | [30.0, 4]
+Motion | ["180 deg", "30 rpm", "180 deg/s^2"] | [PI, PI, PI]
 Law | [["0 s", "0.5 min"], ["0 deg", 2], 4, "rest"] | [[0, 30], [0, 2], 4, "rest"]
 Point | ["P", 3, ["5 cm", "180 deg"]] | ["P", 3, [0.05, PI]]
 Table | [["0 deg", "180 deg"], [1.0, 2.0]] | [[0.0, PI], [1.0, 2.0]]
@@ -45,6 +45,11 @@ SAME = [
         lambda bar, force, at, moment: Load(bar, force, from_pin=at, moment=moment),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
         (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
+    ),
+    (
+        lambda *swept: Motion(Sweep(*swept)),
+        ("180 deg", "2 rad", 4),
+        (np.pi, 2.0, 4),
     ),
     (
         Spring,

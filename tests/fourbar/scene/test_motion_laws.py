@@ -165,7 +165,7 @@ TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"], '
             for more, *words in read_rows("""
 alpha_2 = ["0 rad/s^2", "1 rad/s^2"] | alpha_2 | omega_2
 omega_2 = ["0 rad/s", "1 rad/s"], ends = "rest" | law.ends | left out
-omega_3 = ["0 rad/s", "1 rad/s"] | omega_3 | commands bar 2
+omega_3 = ["0 rad/s", "1 rad/s"] | omega_3 | left out beside theta_2
 omega_2 = ["0 rad/s"] | omega_2 | needs 2
 """)
         ),

@@ -12,6 +12,7 @@ from pytest import approx, raises
 import fourbar
 from fourbar import (
     FourBarError,
+    Free,
     InputError,
     LinearDrive,
     Motion,
@@ -107,8 +108,8 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
     read_rows("""
 {"stroke": 0.9, "side": "left"} | 0.18 to 0.42 m
 {"stroke": 0.3} | left
-{"stroke": 0.3, "side": "left", "theta_2": 1} | alone
-{"stroke": -0.3, "side": "left"} | above 0
+{"stroke": 0.3, "side": "left", "theta_2": 1} | one bar
+{"stroke": 0, "side": "left"} | above 0
 """),
 )
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
@@ -118,6 +119,8 @@ def test_what_cannot_be_is_refused_in_one_line(motion, says):
 
 
 def test_who_does_not_take_it_says_so():
+    with raises(InputError, match="no release besides"):
+        Motion(stroke=0.3, side="left", free=Free(1.0, 2))
     with raises(InputError, match=r"motion\.stroke.*cylinder"):
         crank_rocker(motion=Motion(stroke=0.3, side="left"))
     by_stroke = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
