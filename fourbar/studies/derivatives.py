@@ -4,7 +4,6 @@ The formulas run as they stand, on numbers that carry their slopes.
 """
 
 import math
-from collections.abc import KeysView
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -72,6 +71,8 @@ _HUNDREDTH, _DEGREE = 0.01, math.radians(1.0)
 """Change of a number for which its influence is reported. It is relative, or in rad for
 an angle.
 """
+_OF_POSITIONS = ("pins", "lengths", "points", "drive")
+"""Beginnings of the keys of numbers on which positions depend."""
 _NO_INFLUENCE = 1e-13
 """Change over the largest value of its quantity that is rounding."""
 AT_REST = "at_rest"
@@ -135,19 +136,12 @@ class Sensitivity:
 
         Raises InputError for a quantity or a key that is not known here.
         """
-        name = self._find_whole(quantity)
         if not isinstance(key, str) or key not in self.keys:
             raise InputError(
                 "sensitivity", key, "is not known here; known: " + ", ".join(self.keys)
             )
-        slopes: Array = self.by[name][list(self.keys).index(key)]
-        if quantity == name:
-            return slopes
-        if quantity.startswith("|"):
-            value = self.value(name)
-            with np.errstate(all="ignore"):
-                return np.asarray((slopes * value).sum(axis=-1) / np.hypot(*value.T))
-        return slopes[:, "xy".index(quantity[-1])]
+        slopes: Array = self.find(quantity)[1][list(self.keys).index(key)]
+        return slopes
 
     def value(self, quantity: str) -> Array:
         """Return the quantity, or a component or magnitude of it.
@@ -157,11 +151,32 @@ class Sensitivity:
 
         Raises InputError as `of` does.
         """
-        name = self._find_whole(quantity)
-        values: Array = find_values(self.solution, name)
-        if quantity == name:
-            return values
-        return split_parts(name, values)[quantity]
+        return self.find(quantity)[0]
+
+    def find(self, quantity: str) -> tuple[Array, Array]:
+        """Return a quantity, (n,) or (n, 2), and its derivatives by all keys, (p, ...).
+
+        Quantities and errors are those of `of`.
+        """
+        named = str(quantity)
+        for name in (named, named.strip("|"), named[:-2]):
+            if name not in self.by:
+                continue
+            slopes = self.by[name]
+            values: Array = find_values(self.solution, name)
+            if name == quantity:
+                return values, slopes
+            parts = split_parts(name, values)
+            if quantity in parts:
+                of_parts = split_parts(name, slopes)
+                if named.startswith("|"):
+                    with np.errstate(all="ignore"):
+                        along = (slopes * values).sum(axis=-1) / parts[named]
+                    of_parts[named] = along
+                return parts[named], of_parts[named]
+        raise InputError(
+            "sensitivity", quantity, "is not known here; known: " + ", ".join(self.by)
+        )
 
     def to_pandas(self) -> "DataFrame":
         """Make a table, a row for each number and position.
@@ -170,35 +185,15 @@ class Sensitivity:
 
         Raises DependencyError where pandas is not installed.
         """
-        n = len(self.status)
-        every = (
-            part for name in self.by for part in split_parts(name, self.value(name))
-        )
-        parts = sorted(every, key=lambda part: part[0] == "|")  # magnitudes last
-        columns = {
-            part: np.ravel([self.of(part, key) for key in self.keys]) for part in parts
-        }
+        parts = [part for name in self.by for part in split_parts(name, self.by[name])]
+        parts.sort(key=lambda part: part[0] == "|")  # magnitudes last
         first = {
-            "key": np.repeat(list(self.keys), n),
+            "key": np.repeat(list(self.keys), len(self.status)),
             "theta_2": np.tile(self.solution.theta_2, len(self.keys)),
             "status": self.status * len(self.keys),
         }
-        return make_data_frame(first | columns)
-
-    def _find_whole(self, quantity: str) -> str:
-        """Return the quantity that is named, or whose part is named.
-
-        A part is a component or the magnitude. Raises InputError for any other name.
-        """
-        if isinstance(quantity, str):
-            for name in (quantity, quantity.strip("|"), quantity[:-2]):
-                if name in self.by and (
-                    name == quantity or quantity in split_parts(name, self.by[name])
-                ):
-                    return name
-        raise InputError(
-            "sensitivity", quantity, "is not known here; known: " + ", ".join(self.by)
-        )
+        slopes = {part: self.find(part)[1].ravel() for part in parts}
+        return make_data_frame(first | slopes)
 
     def influences(self, quantity: str) -> list[_Influence]:
         """List by how much the numbers change a quantity, the largest first.
@@ -206,16 +201,13 @@ class Sensitivity:
         A pin force counts by its magnitude.
         """
         part = f"|{quantity}|" if quantity in PIN_FORCES else quantity
-        value = self.value(part)
+        value, slopes = self.find(part)
         size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
         rounding = _NO_INFLUENCE * np.nanmax(size, initial=0.0)
         rows = []
-        for (key, entry), number in zip(
-            self.keys.items(),
-            self.numbers.tolist(),
-            strict=True,
-        ):
-            change = self._find_step(entry, number) * self.of(part, key)
+        steps = map(self._find_step, self.keys.values(), self.numbers.tolist())
+        for key, step, slope in zip(self.keys, steps, slopes, strict=True):
+            change = step * slope
             if change.ndim == 2:
                 change = np.hypot(*change.T)
             if np.isfinite(change).any():
@@ -303,18 +295,11 @@ def sensitivity(scene: Scene) -> Sensitivity:
         )
     at = command(scene)
     solution = solve(scene)
-    entries = list_entries(scene)
     moving = at.speed is not None
-    if not moving:  # positions depend on these alone
-        of_positions = ("pins", "lengths", "points", "drive")
-        entries = {
-            key: n
-            for key, n in entries.items()
-            if key.startswith(of_positions) or ".centre." in key
-        }
-    keys = {
-        theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)
-    } | entries
+    keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)}
+    for key, entry in list_entries(scene).items():
+        if moving or key.startswith(_OF_POSITIONS) or ".centre." in key:
+            keys[key] = entry
     most = float(at.places.max()) if at.moves_stroke else np.nan
     numbers = [
         most if key == theta else read_number(scene, entry)
@@ -345,12 +330,10 @@ def sensitivity(scene: Scene) -> Sensitivity:
     status = np.array(STATUS_NAMES, dtype="<U16")[solution.status_code]
     with np.errstate(all="ignore"):
         _, decided = Case.of(scene, at.bar).half_angle(at)
-        status[decided] = STATUS_NAMES[
-            SINGULAR
-        ]  # doubles cannot tell the factors from zero
-        regular = np.flatnonzero(
-            ~np.isin(status, [STATUS_NAMES[code] for code in (NOT_ASSEMBLED, SINGULAR)])
-        )
+        # doubles cannot tell the factors from zero
+        status[decided] = STATUS_NAMES[SINGULAR]
+        without = STATUS_NAMES[NOT_ASSEMBLED], STATUS_NAMES[SINGULAR]
+        regular = np.flatnonzero(~np.isin(status, without))
         seeded = scene
         for number, (key, entry) in sorted(
             enumerate(keys.items()), key=lambda one: not moves_before_pins(*one[1])
@@ -363,21 +346,10 @@ def sensitivity(scene: Scene) -> Sensitivity:
             )
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
-            derived, marks = _compute_derivatives(
-                seeded, keys, at, index, by.keys(), moving
-            )
+            marks = _derive(seeded, keys, at, index, by)
             is_ok = solution.status_code[index] == OK
-            status[index[marks[AT_FREE_LENGTH] & is_ok]] = AT_FREE_LENGTH
-            status[index[marks[AT_REST] & is_ok]] = AT_REST
-            for name, number in derived.items():
-                slopes = np.broadcast_to(take_slopes(number), (p, len(index)))
-                if by[name].ndim == 3:
-                    by[name][:, index, 0], by[name][:, index, 1] = (
-                        slopes.real,
-                        slopes.imag,
-                    )
-                else:
-                    by[name][:, index] = slopes.real
+            for word, mark in marks.items():
+                status[index[mark & is_ok]] = word
     stands = (status == AT_REST) & (at.stated[1] == 0.0)
     by_speed = np.array([[key == f"motion.{at.names[1]}"] for key in keys])
     lost = (status != STATUS_NAMES[OK]) & (by_speed | ~stands)
@@ -421,18 +393,18 @@ def _make_unit_slope(index: int, count: int) -> Sloped:
     return Sloped(0.0, np.eye(count)[:, index : index + 1])
 
 
-def _compute_derivatives(
+def _derive(
     scene: Scene,
     keys: dict[str, SceneNumber],
     stated: Command,
     index: NDArray[np.intp],
-    names: KeysView[str],
-    moving: bool,
-) -> tuple[dict[str, Any], dict[str, NDArray[np.bool_]]]:
-    """Compute the quantities at some positions, with their slopes.
+    by: dict[str, Array],
+) -> dict[str, NDArray[np.bool_]]:
+    """Compute the slopes of quantities at some positions into arrays, by name.
 
-    The second result marks, by status, the positions where forces have no slopes.
+    The result marks, by status, the positions where forces have no slopes.
     """
+    moving = stated.speed is not None
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
@@ -453,7 +425,7 @@ def _compute_derivatives(
     case = case._replace(path=_SlopedPath(*case.path))
     motion = Command(q, stated.branch[index].astype(float), speed, acceleration)
     state = case.assemble(motion, case.path.half_angle(q), moving=moving)
-    quantities = {**list_kinematics(case, state, names), **of_command}
+    quantities = {**list_kinematics(case, state, by.keys()), **of_command}
     quantities["condition"] = quantities["condition"] * condition
     held, off = np.zeros((2, len(index)), dtype=bool)
     if moving:
@@ -473,7 +445,7 @@ def _compute_derivatives(
         quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
         low, high = case.drive_names.low, case.drive_names.high
-        if low in names:
+        if low in by:
             still = state._replace(speed=0.0)
             ahead = case.dynamics(still, acceleration, 1).effort
             back = case.dynamics(still, acceleration, -1).effort
@@ -481,10 +453,13 @@ def _compute_derivatives(
             quantities[low] = select(falls, back, ahead)
             quantities[high] = select(falls, ahead, back)
     origin = vector(*scene.origin)  # places are those of the drawing
-    for name in names:
+    for name, slopes_of in by.items():
+        number = quantities[name]
         if find_unit_of_quantity(name) == "m" and not is_scalar(name):
-            quantities[name] = quantities[name] + origin
-    return {name: quantities[name] for name in names}, {
-        AT_REST: held,
-        AT_FREE_LENGTH: off,
-    }
+            number = number + origin
+        slopes = np.asarray(take_slopes(number))
+        if slopes_of.ndim == 3:
+            slopes = np.stack([slopes.real, slopes.imag], axis=-1)
+        slopes_of[:, index] = slopes.real
+    # where both hold, a pin at rest counts
+    return {AT_FREE_LENGTH: off, AT_REST: held}

@@ -5,7 +5,7 @@ Samples give the spread, and the sensitivities give it to first order.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,9 @@ from fourbar.studies.study import Study, solve_some, vary
 from fourbar.writing import (
     describe_extent,
     list_names,
-    make_data_frame,
     make_html,
     write_between,
 )
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 SAMPLES = 8192
 _MOST_SAMPLES = 10_000_000
@@ -113,32 +109,6 @@ class Tolerances:
     """Members with a number that no scene takes (a length below zero)."""
     time: Array | None = None
     """Times of the positions along a law, (n,), s."""
-
-    def to_pandas(self) -> "DataFrame":
-        """Make a table, a row for each quantity and position, in SI units and rad.
-
-        Shares of the variance are named "share of KEY".
-
-        Raises DependencyError where pandas is not installed.
-        """
-        first = {
-            "quantity": np.repeat(list(self.spreads), len(self.theta_2)),
-            "theta_2": np.tile(self.theta_2, len(self.spreads)),
-        }
-        if self.time is not None:
-            first["time"] = np.tile(self.time, len(self.spreads))
-        names = [name for name in Spread._fields if name != "shares"]
-        columns = {
-            name: np.ravel([getattr(spread, name) for spread in self.spreads.values()])
-            for name in names
-        }
-        shares = {
-            f"share of {tolerance.key}": np.ravel(
-                [spread.shares[k] for spread in self.spreads.values()]
-            )
-            for k, tolerance in enumerate(self.scene.tolerances)
-        }
-        return make_data_frame(first | columns | shares)
 
     def describe_seed(self) -> str:
         """Say where the random numbers came from."""
@@ -292,13 +262,12 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
 
     Figures of the samples are NaN until `_fill` puts them in.
     """
-    scene = slopes_of.scene
-    nominal = slopes_of.value(part)
-    slopes = np.array(
-        [slopes_of.of(part, tolerance.key) for tolerance in scene.tolerances]
-    )
+    toleranced = slopes_of.scene.tolerances
+    nominal, of_all = slopes_of.find(part)
+    keys = list(slopes_of.keys)
+    slopes = of_all[[keys.index(tolerance.key) for tolerance in toleranced]]
     deviations, reaches = (
-        np.array([getattr(tolerance, width) for tolerance in scene.tolerances])[:, None]
+        np.array([getattr(tolerance, width) for tolerance in toleranced])[:, None]
         for width in ("deviation", "reach")
     )
     shares = (slopes * deviations) ** 2

@@ -128,12 +128,6 @@ def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
         assert_array_equal(rows[name], slopes.of(name, "lengths.input"))
     assert set(spread.spreads) <= set(table.columns)
     assert all(np.isfinite(slopes.value(name)).all() for name in spread.spreads)
-    wide = spread.to_pandas()
-    of_F43 = wide[wide["quantity"] == "|F43|"]
-    size = spread.spreads["|F43|"]
-    assert len(wide) == 61 * len(spread.spreads)
-    assert_array_equal(of_F43["deviation"], size.deviation)
-    assert_array_equal(of_F43["share of lengths.input"], size.shares[0])
 
 
 def test_the_slope_of_a_size_is_its_difference():
