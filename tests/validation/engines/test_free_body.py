@@ -13,7 +13,9 @@ from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.free_body import FreeBody, continue_couples
+from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.linear import solve_system
+from fourbar_validation.engines.sliding import continue_couples
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, crank_rocker
@@ -72,7 +74,10 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         "itertools",
         "math",
         "typing",
-        *(f"{engines}{name}" for name in ("free_body", "description", "linear")),
+        *(
+            f"{engines}{name}"
+            for name in ("free_body", "description", "linear", "sliding")
+        ),
         *(f"{compare}{name}" for name in ("answer", "line", "pins")),
     )
     for module in (free_body, free_body_closure, free_body_effects):
@@ -190,6 +195,6 @@ def test_friction_of_several_pins_fulfils_its_equations():
 def test_a_singular_position_costs_no_other():
     singular, regular = [[1.0, 2.0], [2.0, 4.0]], [[2.0, 0.0], [0.0, 4.0]]
     matrix = np.array([singular, regular, [[np.nan, 1.0], [1.0, 1.0]]])
-    x, residual = free_body.solve_system(matrix, np.ones((3, 2, 1)))
+    x, residual = solve_system(matrix, np.ones((3, 2, 1)))
     assert np.isnan(x[[0, 2]]).all() and residual == 0.0
     np.testing.assert_array_equal(x[1, :, 0], [0.5, 0.25])

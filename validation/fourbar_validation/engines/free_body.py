@@ -13,7 +13,6 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, Array, ComplexArray
@@ -42,7 +41,8 @@ from fourbar_validation.engines.free_body_effects import (
     list_sliding_pins,
     sum_acting,
 )
-from fourbar_validation.engines.linear import solve_refined
+from fourbar_validation.engines.linear import solve_system
+from fourbar_validation.engines.sliding import continue_couples, solve_couples
 
 NAME = "free-body"
 FORCE_COLUMNS = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
@@ -53,16 +53,6 @@ EQUATION_ROWS = {2: (0, "F12", "F32"), 3: (3, "F23", "F43"), 4: (6, "F14", "F34"
 POSITIONS_SOLVED_AT_ONCE = 4096
 """Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
 are 22 MB.
-"""
-_FRICTION_STAGES = 16
-"""Stages in which friction grows to its full coefficient. Each is the start of the
-next.
-"""
-_FRICTION_STEPS = 60
-"""Newton's steps in a stage; where it converges it needs a tenth of them."""
-_FRICTION_SETTLED = 8.0 * 2.0**-52
-"""Residual of a friction couple's equation, over the sum of its terms, that counts as
-rounding.
 """
 _FRICTION_STARTS = 100
 """Starts from which other solutions are sought, over six decades of couples."""
@@ -450,46 +440,6 @@ def _make_right_sides(linkage: FourBar, wrenches: BodyWrenches) -> Array:
     return right
 
 
-def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
-    """Solve linear systems, NaN where singular.
-
-    The largest residual over |matrix| |x| + |right| is returned too.
-    """
-    x = np.full(right.shape, np.nan)
-    finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
-    finite[finite] = np.linalg.det(matrix[finite]) != 0.0
-    matrix = matrix[finite]
-    right = right[finite]
-    x[finite] = solve_refined(matrix, right)
-    terms = np.abs(matrix) @ np.abs(x[finite]) + np.abs(right)
-    remaining = np.abs(right - matrix @ x[finite]) / np.where(terms == 0.0, 1.0, terms)
-    return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))
-
-
-@np.errstate(invalid="ignore")
-def continue_couples(F: ComplexArray, C: ComplexArray, k: Array) -> tuple[Array, Array]:
-    """Solve x_p = k_p |F_p + sum over q of C_pq x_q|, (n, p).
-
-    The continuation starts from no friction; NaN where it jams. The Jacobian of the
-    equations is returned too, (n, p, p).
-
-    Parameters
-    ----------
-    F : pin forces without this friction, (n, p), N.
-    C : force that a couple of 1 N m against the rotation at pin q adds at pin p, (n, p,
-        p), 1/m.
-    k : mu r of each pin, m.
-    """
-    x = np.zeros(F.shape)
-    for stage in range(1, _FRICTION_STAGES + 1):
-        x, settled, matrix = solve_couples(F, C, k * (stage / _FRICTION_STAGES), x)
-        # without friction the determinant is 1; a change of its sign means that the
-        # branch has turned back
-        grown = settled & (np.linalg.det(matrix) > 0.0) & (x >= 0.0).all(axis=1)
-        x = np.where(grown[:, None], x, np.nan)
-    return x, np.where(grown[:, None, None], matrix, np.nan)
-
-
 def _compute_distance_from_jamming(matrix: Array) -> Array:
     """Compute the least singular value of Jacobians, at most 1, (n,)."""
     far = np.full(len(matrix), np.nan)
@@ -497,52 +447,6 @@ def _compute_distance_from_jamming(matrix: Array) -> Array:
     far[finite] = np.linalg.svd(matrix[finite], compute_uv=False)[:, -1]
     least: Array = np.minimum(far, 1.0)
     return least
-
-
-def _compute_friction_jacobian(
-    F: ComplexArray,
-    C: ComplexArray,
-    k: Array,
-    x: Array,
-) -> tuple[Array, Array]:
-    """Compute the pin forces under couples, (n, p), N, and the Jacobian.
-
-    The Jacobian is that of `continue_couples`, (n, p, p).
-    """
-    force = F + (C * x[:, None, :]).sum(axis=-1)
-    size = np.abs(force)
-    direction = force / np.where(size == 0.0, 1.0, size)
-    slopes = k[..., None] * (np.conj(direction)[..., None] * C).real
-    return size, np.eye(k.shape[-1]) - slopes
-
-
-def solve_couples(
-    F: ComplexArray,
-    C: ComplexArray,
-    k: Array,
-    x: Array,
-) -> tuple[Array, NDArray[np.bool_], Array]:
-    """Solve by Newton's method from couples `x`.
-
-    Return also where it converged, and the Jacobian, (n, p, p).
-    """
-    x = x.copy()
-    settled = np.zeros(len(x), dtype=bool)
-    matrix = np.empty((*x.shape, x.shape[-1]))
-    left = np.arange(len(x))  # positions where a step is still to be taken
-    for _ in range(_FRICTION_STEPS):
-        load, adds, couples = F[left], C[left], x[left]
-        size, matrix[left] = _compute_friction_jacobian(load, adds, k, couples)
-        gap = k * size - couples
-        terms = k * (np.abs(load) + (np.abs(adds) * couples[:, None, :]).sum(axis=-1))
-        settled[left] = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
-        step = solve_system(matrix[left], gap[..., None])[0][..., 0]
-        moving = ~settled[left] & np.isfinite(step).all(axis=1)
-        left = left[moving]
-        if not len(left):
-            break
-        x[left] += step[moving]
-    return x, settled, matrix
 
 
 def stack_components(vectors: ComplexArray) -> Array:

@@ -25,3 +25,19 @@ def solve_refined(matrix: Array, right: Array) -> Array:
     """
     x = np.linalg.solve(matrix, right)
     return x + np.linalg.solve(matrix, right - matrix @ x)
+
+
+def solve_system(matrix: Array, right: Array) -> tuple[Array, float]:
+    """Solve linear systems, NaN where singular.
+
+    The largest residual over |matrix| |x| + |right| is returned too.
+    """
+    x = np.full(right.shape, np.nan)
+    finite = np.asarray(np.isfinite(matrix).all(axis=(1, 2)))
+    finite[finite] = np.linalg.det(matrix[finite]) != 0.0
+    matrix = matrix[finite]
+    right = right[finite]
+    x[finite] = solve_refined(matrix, right)
+    terms = np.abs(matrix) @ np.abs(x[finite]) + np.abs(right)
+    remaining = np.abs(right - matrix @ x[finite]) / np.where(terms == 0.0, 1.0, terms)
+    return x, float(np.max(remaining, initial=0.0, where=np.isfinite(remaining)))

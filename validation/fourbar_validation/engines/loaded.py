@@ -4,7 +4,6 @@ Loads and effects act on them as wrenches, from its own numbers.
 """
 
 import cmath
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -12,36 +11,25 @@ import numpy as np
 
 from fourbar.effects import PointDrive
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import Array
+from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import (
     FORCE_AT,
     PART_POINTS,
     name_driving,
 )
+from fourbar_validation.engines.sliding import continue_couples
 
 if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
     from fourbar.effects.place import Place
 
-FRICTION_PASSES = 1000
-"""Passes over pin loads and the friction they make. Each lessens the error where the
-friction is far from a jam.
+FRICTION_STEPS = 100
+"""Steps from pin loads to the friction they make and back. Each lessens the error where
+the friction is far from a jam.
 """
-STAGES_NEAR_A_JAM = 16
-"""Stages in which friction grows near a jam."""
-STEPS_OF_A_STAGE = 30
-"""Newton's steps of each of these stages."""
-NUDGE = 1e-6
-"""Change of each load for the slopes of a pass, in parts of the greatest load."""
-REPEATED = 2.0 * 2.0**-52
-"""Change of a pin load, relative, that is rounding."""
-ROUNDED = 1e-11
-"""Relative change that is rounding once it no longer falls, even near a pole of the
-torque.
-"""
-_DIVERGED = 1e100
-"""Load, N, that only passes running away from each other reach."""
+REPEATED = 4.0 * 2.0**-52
+"""Change of a pin load, in parts of the greatest, that is rounding."""
 Components = tuple[float, float]
 """A vector of the plane as plain numbers, as an engine's calls take it. Everywhere else
 vectors are complex numbers, x + i y.
@@ -97,9 +85,7 @@ class Loaded(Assembled, Protocol):
     loaded: list[str]
     """Pins whose friction depends on their load."""
     pin_loads: dict[str, float]
-    """Magnitudes of its own pin forces in the last pass, by pin, N. Empty before the
-    first.
-    """
+    """Magnitudes of pin forces on which friction depends, by pin, N."""
     wrenches: dict[int, list[float]]
     """Sum of what acts on each moving bar as a force at its first pin and a couple, (x,
     y, moment), N and N m.
@@ -243,86 +229,43 @@ class Loaded(Assembled, Protocol):
         for act in self.terms:
             act()
 
+    @np.errstate(over="ignore", invalid="ignore")
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Solve for pin forces and torque that balance what acts, by name.
 
-        The result is empty where friction jams. Effects that depend on the load of a
-        pin are given the loads of the pass before, until they repeat.
-        """
-        self.pin_loads = {}
-        before = math.inf
-        forces = balanced()
-        if not self.loaded:
-            return forces
-        for _ in range(FRICTION_PASSES):
-            loads = {pin: math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded}
-            most = max(loads.values())
-            change = max(
-                abs(load - self.pin_loads.get(pin, 0.0)) for pin, load in loads.items()
-            )
-            if _is_settled(change, before, most):
-                return forces
-            if not most < _DIVERGED:
-                break
-            before = change
-            self.pin_loads = loads
-            forces = balanced()
-        return self._grow(balanced)
-
-    def _grow(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Grow friction from none, where passes run away.
-
-        The result is empty where the growth ends in a jam. By Newton's steps, the
-        slopes from passes with each load changed a little.
+        The result is empty where friction jams. Forces are linear in the loads on which
+        friction depends: a pass without them, and one with each of them, tell how.
         """
 
-        def passed(loads: Array) -> tuple[dict[str, Any], Array]:
+        def passed(loads: Array) -> tuple[dict[str, Any], ComplexArray]:
             self.pin_loads = dict(zip(self.loaded, loads.tolist(), strict=True))
             forces = balanced()
-            sizes = [math.hypot(*forces[FORCE_AT[pin]]) for pin in self.loaded]
-            return forces, np.array(sizes)
+            on_pins = [complex(*forces[FORCE_AT[pin]]) for pin in self.loaded]
+            return forces, np.array(on_pins)
 
-        unit = np.eye(len(self.loaded))
-        forces, loads = passed(np.zeros(len(unit)))
-        for share in np.arange(1, STAGES_NEAR_A_JAM + 1) / STAGES_NEAR_A_JAM:
-            before = math.inf
-            for _ in range(STEPS_OF_A_STAGE):
-                forces, settled_loads = passed(share * loads)
-                most = float(settled_loads.max())
-                change = float(np.abs(settled_loads - loads).max())
-                if not most < _DIVERGED or _is_settled(change, before, most):
-                    break
-                before = change
-                nudge = NUDGE * most
-                slopes = []
-                for direction in unit:
-                    _, moved = passed(share * (loads + nudge * direction))
-                    slopes.append((moved - settled_loads) / nudge)
-                matrix = unit - np.stack(slopes, axis=1)
-                # 1 without friction: beyond zero the growth has turned back
-                if np.linalg.det(matrix) <= 0.0:
-                    return {}
-                loads = loads + np.linalg.solve(matrix, settled_loads - loads)
-            if not change <= ROUNDED * most or (loads < 0.0).any():
+        loads = np.zeros(len(self.loaded))
+        forces, without = passed(loads)
+        if not self.loaded:
+            return forces
+        probe = float(np.abs(without).max()) or 1.0
+        columns = []
+        for load in probe * np.eye(len(loads)):
+            _, on_pins = passed(load)
+            columns.append((on_pins - without) / probe)
+        per_load = np.stack(columns, axis=1)
+        for _ in range(FRICTION_STEPS):
+            before = loads
+            loads = np.abs(without + per_load @ loads)
+            if np.abs(loads - before).max() <= REPEATED * loads.max():
+                break
+        else:
+            unit = np.ones(len(loads))
+            grown, _ = continue_couples(without[None], per_load[None], unit)
+            (loads,) = grown
+            if np.isnan(loads).any():
                 return {}
+        forces, _ = passed(loads)
         return forces
-
-
-def _is_settled(
-    change: float,
-    before: float,
-    most: float,
-) -> bool:
-    """Tell whether passes over the friction repeat the pin loads.
-
-    Once down to the rounding of a pass, the change falls no further.
-
-    Parameters
-    ----------
-    change, before : largest change of a load in this pass and in the one before, N.
-    most : largest load, N.
-    """
-    return change <= REPEATED * most or before <= change <= ROUNDED * most
 
 
 def make_no_wrenches() -> dict[int, list[float]]:
