@@ -121,9 +121,9 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor, monkeypatch)
     """The engine is judged at the motion it made; its own speed says that it is not the
     law's.
     """
-    right = runner.LawCourse.alpha
+    right = runner.RunCourse.alpha
     monkeypatch.setattr(
-        runner.LawCourse, "alpha", lambda *arguments: factor * right(*arguments)
+        runner.RunCourse, "alpha", lambda *arguments: factor * right(*arguments)
     )
     failed = [row.reason for row in simulated(PERIODIC) if not row.passed]
     assert any("does not turn as commanded" in reason for reason in failed)

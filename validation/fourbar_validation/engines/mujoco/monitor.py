@@ -29,50 +29,40 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.tree import put_back, solve_multipliers
 
 
-@dataclass(frozen=True, slots=True)
-class _ResidualLimit:
-    """Greatest allowed value of a residual, and the reason."""
-
-    value: float
-    reason: str
-
-
-RESIDUAL_LIMITS = {
-    "acceleration_gap": _ResidualLimit(
-        1e-3,
-        "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 %"
-        " has 4",
-    ),
-    "power_gap": _ResidualLimit(
-        1e-4,
-        "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped"
-        " solver 1",
-    ),
-    "force_gap": _ResidualLimit(
-        1e-3,
-        "of the greatest joint torque: the solver did not converge; healthy runs have"
-        " 1e-8..1e-4",
-    ),
-}
+RESIDUALS = ("acceleration_gap", "power_gap", "force_gap")
 """Residuals of motion and forces that `ResidualMonitor` measures."""
 _FORCE_RESIDUALS = ("power_gap", "force_gap")
 """Residuals relative to forces, whose terms may cancel."""
 _EXCUSED = 1e-3
 """A solver's residual excuses an error of this part of a force, not more."""
-_OF_THE_DATA = {
-    "bad_states": _ResidualLimit(
+_LIMITS = {
+    "bad_states": (
         0.0,
         "MuJoCo warned of a bad position, velocity or acceleration, and reset its data",
     ),
-    "time_went_back": _ResidualLimit(
-        0.0, "the time ran backwards: the data were reset"
+    "time_went_back": (0.0, "the time ran backwards: the data were reset"),
+    "closure_gap": (1e-5, "of the sum of the lengths: the loop is open"),
+    "speed_error": (
+        1e-4,
+        "of the greatest speed: the crank does not turn as commanded",
     ),
-    "closure_gap": _ResidualLimit(1e-5, "of the sum of the lengths: the loop is open"),
-    "speed_error": _ResidualLimit(
-        1e-4, "of the greatest speed: the crank does not turn as commanded"
+    "acceleration_gap": (
+        1e-3,
+        "of the greatest a_B: healthy runs have 1e-7..1e-4, a step that errs by 98 %"
+        " has 4",
+    ),
+    "power_gap": (
+        1e-4,
+        "of the greatest power: healthy runs have 1e-8..1e-5, that step 4e-2, a stopped"
+        " solver 1",
+    ),
+    "force_gap": (
+        1e-3,
+        "of the greatest joint torque: the solver did not converge; healthy runs have"
+        " 1e-8..1e-4",
     ),
 }
-"""Limits of the residuals that the data of the simulation state directly."""
+"""Greatest allowed value of each residual, and the reason."""
 
 
 def list_alarms(evidence: dict[str, float], size: float, factor: float) -> list[str]:
@@ -87,10 +77,10 @@ def list_alarms(evidence: dict[str, float], size: float, factor: float) -> list[
     """
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     alarms = []
-    for name, limit in {**_OF_THE_DATA, **RESIDUAL_LIMITS}.items():
-        most = limit.value * factor if name in _FORCE_RESIDUALS else limit.value
+    for name, (limit, reason) in _LIMITS.items():
+        most = limit * factor if name in _FORCE_RESIDUALS else limit
         if name in seen and not seen[name] <= most:
-            alarms.append(f"{name} = {seen[name]:.1e} > {most:g}: {limit.reason}")
+            alarms.append(f"{name} = {seen[name]:.1e} > {most:g}: {reason}")
     return alarms
 
 
@@ -129,8 +119,8 @@ class ResidualMonitor:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         if self.bars.drive is not None:
             model.actuator_biastype[self.bars.drive] = mujoco.mjtBias.mjBIAS_NONE
-        self.worst = dict.fromkeys(RESIDUAL_LIMITS, 0.0)
-        self._most = dict.fromkeys(RESIDUAL_LIMITS, 0.0)
+        self.worst = dict.fromkeys(RESIDUALS, 0.0)
+        self._most = dict.fromkeys(RESIDUALS, 0.0)
 
     def look(
         self,

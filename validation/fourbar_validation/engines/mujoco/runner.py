@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -92,7 +93,7 @@ class Segment:
             steps = max(steps, settings.steps_per_window * most / self.turned)
         least = self.width if at_least is None else at_least
         # what is a whole number must not become one more by a rounding
-        unit = self.width if self.course.read_at_steps else 1
+        unit = self.width if self.course.law is not None else 1
         steps = math.ceil(steps / unit * (1.0 - 1e-9)) * unit
         steps = max(steps, least)
         return self.duration / steps * settings.timestep_scale
@@ -104,23 +105,34 @@ class Segment:
 
 
 class RunCourse:
-    """A command run through in time, the input at constant acceleration."""
+    """A command run through in time.
+
+    The input moves at constant acceleration, or by a law; flywheel and closure are then
+    laid out for its greatest |omega_2| and |alpha_2|.
+    """
 
     bar: int | None = 2
     """Number of the bar that moves as commanded; None for the stroke."""
-    read_at_steps: bool = False
-    """True if the positions are evenly spaced in time, and each is one of the steps."""
+    law: Any = None
+    """Motion law of the input, of whose instants each position is one."""
 
     def __init__(self, scene: Scene, command: Command) -> None:
         self.command = self.of_input = command
-        self.values: Array = command.theta_2
-        rates = list_speeds(command)
-        self.speed, self.acceleration = (float(rate.max()) for rate in rates)
-        motion = scene.motion.replace(
-            angle=command.theta_2,
-            speed=self.speed,
-            acceleration=self.acceleration,
-        )
+        self.values = self.theta_2 = command.theta_2
+        speeds, accelerations = list_speeds(command)
+        self.speed = float(speeds.max())
+        self.acceleration = float(accelerations.max())
+        if scene.motion.law is not None and command.time is not None:
+            self.law = law = scene.motion.law
+            self.values = command.time
+            self.knots = np.array(law.time)
+            _, _, self.at_knots = law.at(self.knots)
+            instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
+            _, speeds, accelerations = np.abs(law.at(instants))
+            self.speed = float(speeds.max())
+            self.acceleration = float(accelerations.max())
+        greatest = self.speed, self.acceleration
+        motion = Motion(command.theta_2, *greatest, scene.motion.branch)
         self.scene = replace(scene, motion=motion)
         """The scene whose MJCF is run through."""
 
@@ -132,19 +144,31 @@ class RunCourse:
     def times(self, positions: list[int]) -> Array:
         """Return when positions that follow one another are passed, s.
 
-        The first is passed at 0.
+        Without a law the first is passed at 0.
         """
         values = self.values[positions]
+        if self.law is not None:
+            return values
         run = choose_run(values, self.speed, self.acceleration)
         return np.array([run.time(value) for value in values.tolist()])
 
     def speeds(self, times: Array) -> Array:
         """Return the commanded speed at times."""
-        return self.speed + self.acceleration * times
+        if self.law is None:
+            return self.speed + self.acceleration * times
+        _, speeds, _ = self.law.at(times)
+        return np.asarray(speeds)
 
     def turned(self, positions: list[int]) -> float:
-        """Return the range of theta_2 over some positions, rad."""
-        return float(np.ptp(self.command.theta_2[positions]))
+        """Return the range of theta_2 over some positions, rad.
+
+        A law may go out and back between them.
+        """
+        angles = self.theta_2[positions]
+        if self.law is not None:
+            first, last = self.values[[positions[0], positions[-1]]]
+            angles, _, _ = self.law.at(np.linspace(first, last, INSTANTS_OF_A_LAW))
+        return float(np.ptp(angles))
 
     def turning(self, positions: list[int], fastest: float) -> float:
         """Return the greatest speed of the input, rad/s; `fastest`: the commanded."""
@@ -153,36 +177,13 @@ class RunCourse:
     def accelerate(self, began: float) -> ActuatorForce | None:
         """Return the input's acceleration at a state, None if the file states it.
 
-        `began`: time at which the segment begins, s.
+        Stages of a step at one time share what a law has there. `began`: time at which
+        the segment begins, s.
         """
-        return None
-
-    def least_sine(self, closes: NDArray[np.bool_]) -> float:
-        """Return the least |sin(theta_4 - theta_3)| on the way."""
-        return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
-
-
-class LawCourse(RunCourse):
-    """A motion law of the input.
-
-    Flywheel and closure are laid out for its greatest |omega_2| and |alpha_2|.
-    """
-
-    read_at_steps = True
-
-    def __init__(self, scene: Scene, command: Command) -> None:
-        law = scene.motion.law
-        assert law is not None and command.time is not None
-        self.law = law
-        self.time: Array = command.time
-        self.command = self.of_input = command
-        self.knots = np.array(law.time)
-        _, _, self.at_knots = law.at(self.knots)
-        instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
-        _, *rates = law.at(instants)
-        omega, alpha = (float(np.abs(rate).max()) for rate in rates)
-        motion = Motion(command.theta_2, omega, alpha, scene.motion.branch)
-        self.scene = replace(scene, motion=motion)
+        if self.law is None:
+            return None
+        alpha = lru_cache(maxsize=4)(self.alpha)
+        return lambda _, data: alpha(began + data.time)
 
     def alpha(self, instant: float) -> float:
         """Return the law's angular acceleration at a time, rad/s^2.
@@ -195,33 +196,9 @@ class LawCourse(RunCourse):
         _, _, alpha = self.law.at(np.array([instant]))
         return float(alpha[0])
 
-    def order(self) -> NDArray[np.intp]:
-        """Order the positions by their times."""
-        return np.argsort(self.time, kind="stable")
-
-    def times(self, positions: list[int]) -> Array:
-        """Return the times of the law."""
-        return self.time[positions]
-
-    def turned(self, positions: list[int]) -> float:
-        """Return the range of theta_2 from the first position to the last, rad.
-
-        A law may go out and back between them.
-        """
-        times = self.time[positions]
-        instants = np.linspace(times.min(), times.max(), INSTANTS_OF_A_LAW)
-        angles, _, _ = self.law.at(instants)
-        return float(np.ptp(angles))
-
-    def speeds(self, times: Array) -> Array:
-        """Return omega_2 of the law."""
-        _, speeds, _ = self.law.at(times)
-        return speeds
-
-    def accelerate(self, began: float) -> ActuatorForce | None:
-        """Return what evaluates the law at MuJoCo's time, which stages share."""
-        alpha = lru_cache(maxsize=4)(self.alpha)
-        return lambda _, data: alpha(began + data.time)
+    def least_sine(self, closes: NDArray[np.bool_]) -> float:
+        """Return the least |sin(theta_4 - theta_3)| on the way."""
+        return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
 
 
 LIGHT_FLYWHEEL = 1e4
@@ -420,26 +397,21 @@ class Lead(RunCourse):
         closes = np.array([q is not None for q in assembled])
         if not closes.any():
             raise LimitError("the loop closes at none of the positions")
-        found = np.full((3, len(assembled)), np.nan)
-        branch = command.branch.copy()
+        found = np.full((4, len(assembled)), np.nan)
         for index, q in enumerate(assembled):
             if q is not None:
-                found[:, index] = self._find_input(q)
-                branch[index] = loop.branch()
+                found[:, index] = *self._find_input(q), loop.branch()
         found[0, closes] = np.unwrap(found[0, closes])
-        self.led, self.omega_2, _ = found
-        theta_2, omega_2, alpha_2 = found[:, closes]
+        self.theta_2, self.omega_2, _, _ = found
+        theta_2, omega_2, alpha_2, branch = found[:, closes]
         # greatest speed and acceleration, as for a law: flywheel and closure are sized
         # by them
         fastest = float(np.abs(omega_2).max())
         most_accelerated = float(np.abs(alpha_2).max()) or np.finfo(float).tiny
         largest = Motion(theta_2, fastest, most_accelerated)
         self.scene = replace(scene, motion=largest)
-        self.of_input = Command(theta_2, branch[closes], fastest, most_accelerated)
-
-    def turned(self, positions: list[int]) -> float:
-        """Return the range of theta_2 over some positions, rad."""
-        return float(np.ptp(self.led[positions]))
+        signs = branch.astype(np.int8)
+        self.of_input = Command(theta_2, signs, fastest, most_accelerated)
 
     def turning(self, positions: list[int], fastest: float) -> float:
         """Return the greatest speed of the input; LimitError if it must hurry."""

@@ -33,7 +33,6 @@ from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor, list_alarms
 from fourbar_validation.engines.mujoco.runner import (
     Found,
-    LawCourse,
     Lead,
     RunCourse,
     Segment,
@@ -121,14 +120,13 @@ def _choose_course(scene: Scene, command: Command) -> RunCourse:
         )
     if command.bar != 2 or command.moves_stroke:
         return Lead(scene, command)
-    if scene.motion.law is not None and command.time is not None:
-        return LawCourse(scene, command)
-    if any(np.ptp(values) != 0.0 for values in list_speeds(command)):
+    course = RunCourse(scene, command)
+    if course.law is None and np.ptp(list_speeds(command), axis=1).any():
         raise LimitError(
             "omega_2 or alpha_2 differs from position to position: that is no one"
             " motion through time"
         )
-    return RunCourse(scene, command)
+    return course
 
 
 def _require_run(course: RunCourse) -> None:
