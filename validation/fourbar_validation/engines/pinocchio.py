@@ -24,15 +24,22 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
 )
 from fourbar_validation.engines.loop import Assembler, Exact
-from fourbar_validation.engines.tree import KeptTree, keep_tree, solve_closed
+from fourbar_validation.engines.tree import Tree, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-class PinocchioTree(KeptTree):
-    """The open tree, its numbers written from the description."""
+def _shift(place: Sequence[float]) -> pin.SE3:
+    """Return the placement of axes that are moved in the plane, not turned."""
+    return pin.SE3(np.eye(3), np.array([*place, 0.0]))
+
+
+class PinocchioTree(Tree):
+    """The open tree, built from the description."""
 
     def __init__(self, scene: Scene) -> None:
+        if reason := find_unknown(scene, has_term, forces=True):
+            raise LimitError(reason)
         self.model = model = pin.Model()
         self.joint = {1: 0}
         self.frame = dict[str, int]()
@@ -40,65 +47,40 @@ class PinocchioTree(KeptTree):
             joint = model.addJoint(
                 self.joint[part.bearer],
                 pin.JointModelRZ(),
-                pin.SE3.Identity(),
+                _shift(part.first_pin),
                 PIN_OF_MOVING_BAR[part.bar],
             )
             self.joint[part.bar] = joint
-            for name in part.points:
-                self.frame[name] = model.addFrame(
-                    pin.Frame(
-                        name, joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME
-                    ),
-                    False,
-                )
-        self.data = data = model.createData()
-        self.q = np.zeros(3)
-        self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
-        # the engine's own memory, read and written in place: to look it up again costs
-        # more than a pass of the engine
-        self.at = {
-            name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
-        }
-        self.turned_to = {
-            bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()
-        }
-        self.joint_force = {
-            bar: data.f[self.joint[bar]].linear[:2] for bar in MOVING_BARS
-        }
-        self.external_force = {
-            bar: (self.external[joint].linear, self.external[joint].angular)
-            for bar, joint in self.joint.items()
-        }
-        self.model_gravity = model.gravity.linear
-        self.hold(scene)
-
-    def hold(self, scene: Scene) -> None:
-        """Write places, masses and inertias."""
-        if reason := find_unknown(scene, has_term, forces=True):
-            raise LimitError(reason)
-        model = self.model
-        about_g = np.zeros((3, 3))
-        for part in list_moving_parts(scene.linkage):
-            joint = self.joint[part.bar]
-            model.jointPlacements[joint].translation[:2] = part.first_pin
             # nothing is appended, no frame either: below 2.2e-16 kg the sum of two
             # inertias has another mass centre
-            about_g[2, 2] = part.inertia
-            model.inertias[joint] = pin.Inertia(
-                part.mass, np.array([*part.centre, 0.0]), about_g
-            )
+            about_g = np.diag([0.0, 0.0, part.inertia])
+            centre = np.array([*part.centre, 0.0])
+            model.inertias[joint] = pin.Inertia(part.mass, centre, about_g)
             for name, place in part.points.items():
-                frame = model.frames[self.frame[name]]
-                frame.placement.translation[:2] = place
-        self.field = (0.0, 0.0)
+                frame = pin.Frame(name, joint, 0, _shift(place), pin.FrameType.OP_FRAME)
+                self.frame[name] = model.addFrame(frame, False)
+        self.data = model.createData()
+        self.q = np.zeros(3)
+        self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
         self.ready(scene, list_wrenches(scene, self))
-        self.model_gravity[:2] = self.field
+        self._set_gravity(self.field)
+
+    def _set_gravity(self, field: Sequence[float]) -> None:
+        self.model.gravity.linear = np.array([*field, 0.0])
 
     def place(self, q: Sequence[float]) -> None:
         """Place joint frames, Jacobian columns and points at q."""
         self.q[:] = q
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
+
+    def point(self, name: str) -> Array:
+        """Return the origin of a frame."""
+        return np.asarray(self.data.oMf[self.frame[name]].translation[:2])
+
+    def rotation(self, bar: int) -> Array:
+        """Return the axes of the joint's frame."""
+        return np.asarray(self.data.oMi[self.joint[bar]].rotation[:2, :2])
 
     def point_jacobian(self, name: str) -> Array:
         """Return the Jacobian of a frame's origin, (2, 3)."""
@@ -138,31 +120,26 @@ class PinocchioTree(KeptTree):
 
         What acts on the bars are external forces.
         """
-        self.model_gravity[0], self.model_gravity[1] = field
-        motion = self.model, self.data, self.q, self.v, self.a
-        torques: list[float]
-        if not any(map(any, wrenches.values())):
-            torques = pin.rnea(*motion).tolist()
-            return torques
+        self._set_gravity(field)
         for bar, (x, y, moment) in wrenches.items():
-            force, couple = self.external_force[bar]
             inside = complex(x, y) / self.rotate(bar, 1.0)
-            force[:2] = inside.real, inside.imag
-            couple[2] = moment
-        torques = pin.rnea(*motion, self.external).tolist()
+            force = [inside.real, inside.imag, 0.0, 0.0, 0.0, moment]
+            self.external[self.joint[bar]] = pin.Force(np.array(force))
+        torques: list[float] = pin.rnea(
+            self.model, self.data, self.q, self.v, self.a, self.external
+        ).tolist()
         return torques
 
     def joint_forces(self) -> dict[int, complex]:
         """Read what each joint transmits, which the last pass left in its own axes."""
-        return {
-            bar: self.rotate(bar, complex(*force.tolist()))
-            for bar, force in self.joint_force.items()
-        }
+        forces = {}
+        for bar in MOVING_BARS:
+            x, y, _ = self.data.f[self.joint[bar]].linear.tolist()
+            forces[bar] = self.rotate(bar, complex(x, y))
+        return forces
 
 
-PinocchioInverse = partial(
-    Exact, "pinocchio-inverse", partial(keep_tree, PinocchioTree)
-)
+PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
 RELEASED_NAME = "pinocchio-forward"
 BAUMGARTE_TIMESTEPS = 10.0
 """Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30

@@ -22,7 +22,7 @@ from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.tree import KeptTree, solve_closed, solve_multipliers
+from fourbar_validation.engines.tree import Tree, solve_closed, solve_multipliers
 
 
 class PlainLoop:
@@ -31,7 +31,7 @@ class PlainLoop:
     Raises LimitError for a cylinder, and for friction that depends on the pin forces.
     """
 
-    def __init__(self, build: Callable[[Scene], KeptTree], scene: Scene) -> None:
+    def __init__(self, build: Callable[[Scene], Tree], scene: Scene) -> None:
         if scene.drive is not None:
             raise LimitError("the plain loop has a couple on a bar, no cylinder")
         self.linkage = scene.linkage

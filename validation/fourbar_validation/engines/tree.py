@@ -59,11 +59,8 @@ class Tree(Loaded, Protocol):
         " (own dJ/dt v), inverse dynamics, effects from its own state, loop"
         " multipliers, pin forces"
     )
-    turns: Mapping[int, Array] = {}
-    """Derivatives of the bars' rotations by the coordinates.
-
-    In the plane these are constant, whatever the bars: a tree is asked for them once.
-    """
+    turns: Mapping[int, Array]
+    """Derivatives of the bars' rotations by the coordinates, in the plane constant."""
     rows: Array
     """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
     v: Array
@@ -76,10 +73,9 @@ class Tree(Loaded, Protocol):
         """
         super().ready(scene, terms)
         self.alone = bool(scene.loads or scene.effects)
-        if not self.turns:
-            self.place((0.0, 0.0, 0.0))
-            self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
-            self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
+        self.place((0.0, 0.0, 0.0))
+        self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
+        self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
 
     # methods that the engine defines
     def point_jacobian(self, name: str) -> Array:
@@ -224,48 +220,6 @@ class Tree(Loaded, Protocol):
             *_, inertia = solve(self.needed((0.0, 0.0), make_no_wrenches()))
             values[f"{self.driving}_inertia"] = inertia
         return values
-
-
-class KeptTree(Tree, Protocol):
-    """A tree whose numbers can be written anew, and whose places are read in place."""
-
-    at: dict[str, Array]
-    """Places of the points that `description.parts` names, m: the engine's memory."""
-    turned_to: dict[int, Array]
-    """Axes along and across each bar's line: the engine's memory."""
-
-    def __init__(self, scene: Scene) -> None:
-        """Build the tree and hold the bars of a scene."""
-
-    def hold(self, scene: Scene) -> None:
-        """Hold the bars of a scene, in place of those before.
-
-        LimitError says why the engine cannot hold them.
-        """
-
-    def point(self, name: str) -> Array:
-        """Read a place."""
-        return self.at[name]
-
-    def rotation(self, bar: int) -> Array:
-        """Read a bar's axes."""
-        return self.turned_to[bar]
-
-
-_KEPT: dict[type[KeptTree], KeptTree] = {}
-"""The one tree of its kind in this process, with the scene of the last answer."""
-
-
-def keep_tree(kind: type[KeptTree], scene: Scene) -> KeptTree:
-    """Let the one tree of a kind hold a scene.
-
-    To build another tree takes an engine longer than to answer several positions.
-    """
-    if kind not in _KEPT:
-        _KEPT[kind] = kind(scene)
-    else:
-        _KEPT[kind].hold(scene)
-    return _KEPT[kind]
 
 
 def carry(on: dict[int, complex], bar: int, force: complex) -> None:

@@ -28,7 +28,6 @@ from fourbar.quantities import COUPLE, LINE, PIN_FORCES, Array
 from fourbar_validation.engines.mujoco.closed_loop import O2, O4, A, ClosedLoop
 from fourbar_validation.engines.tree import put_back, solve_multipliers
 
-
 RESIDUALS = ("acceleration_gap", "power_gap", "force_gap")
 """Residuals of motion and forces that `ResidualMonitor` measures."""
 _FORCE_RESIDUALS = ("power_gap", "force_gap")
