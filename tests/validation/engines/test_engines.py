@@ -30,7 +30,7 @@ from fourbar.scene.motion import Motion
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines import free_body_closure, loop, tree
+from fourbar_validation.engines import free_body_closure, loop
 from fourbar_validation.engines.balls import compute_directions, make_balls, wedge
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
@@ -402,7 +402,6 @@ def test_a_planted_fault_shows(name, monkeypatch):
     assert judged(name) == set()
     for method, (fault, seen) in PLANTED.items():
         with monkeypatch.context() as patch:
-            patch.setattr(tree, "_KEPT", {})  # a tree is asked once for its turns
             patch.setattr(owner, method, fault(getattr(owner, method)))
             assert seen <= judged(name), method
     monkeypatch.setattr(loop.Assembler, "find", find_other_branch)
