@@ -58,7 +58,7 @@ validation/engines/test_engines.py | validation/scenes: random
 validation/engines/test_engines.py | validation/engines/mujoco: closed_loop inverse
 validation/engines/test_guests.py | validation: engine
 validation/engines/test_guests.py | programs workers
-validation/engines/test_free_body.py | free_body_closure free_body_effects
+validation/engines/test_free_body.py | free_body_closure free_body_effects sliding
 validation/scenes/test_hard_families.py | validation/engines/mujoco: shipped
 validation/scenes/test_hard_families.py | bars
 validation/report/test_sections.py | hard_picture
