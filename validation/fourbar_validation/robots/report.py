@@ -170,9 +170,8 @@ def write_driven_range(loop: LoopMeasurement) -> str:
 
 def _write_heading(loop: LoopMeasurement, *, judged: bool, stated: str) -> str:
     speeds = loop.states.rows.speed
-    speed = " to ".join(
-        f"{end:.4g}" for end in dict.fromkeys((min(speeds), max(speeds)))
-    )
+    ends = (f"{end:.4g}" for end in (min(speeds), max(speeds)))
+    speed = " to ".join(dict.fromkeys(ends))
     how = "in the whole robot against rigid pins, and these against the formulas"
     if judged:
         how = "in the whole robot against the formulas"

@@ -13,7 +13,9 @@ import pytest
 from pytest import approx, raises
 
 from fourbar.errors import InputError
+from fourbar.linkage import ENDS, PINS
 from fourbar_validation.engines.mujoco.robots.closures import find_loops
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 from tests.support.robots import (
     ADAPTIVE,
     EXCAVATOR,
@@ -59,13 +61,18 @@ def test_a_loop_is_where_its_pins_are_wherever_it_is_cut(cut, by):
     data = mujoco.MjData(model)
     data.qpos[:] = loop.qpos
     mujoco.mj_kinematics(model, data)
-    for (bar, pin), place in loop.points.items():
-        body = loop.bodies[bar][0]
-        world = data.xpos[body] + data.xmat[body].reshape(3, 3) @ place
+    frame = LoopFrame(loop, data)
+    for pin, bars in PINS.items():
         expected = np.array([1.0, 2.0, 3.0]) + turn @ [*planar.pins[pin], 0.0]
-        assert np.allclose(world, expected, atol=1e-12), (bar, pin)
-    axis = data.xmat[loop.bodies[1][0]].reshape(3, 3) @ loop.axis
-    assert np.allclose(axis, turn @ [0.0, 0.0, 1.0])
+        for bar in bars:
+            assert np.allclose(frame.locate(bar, pin), expected, atol=1e-12), (bar, pin)
+    assert np.allclose(frame.normal, turn @ [0.0, 0.0, 1.0])
+    # open again, each end of the closure is still on its own bar
+    data.qpos[-3:] += (0.1, 0.2, 0.4)
+    mujoco.mj_kinematics(model, data)
+    for bar, length in zip(ENDS, loop.lengths, strict=True):
+        if len(loop.bodies[bar]) == 1:
+            assert abs(frame.line(bar)) == approx(length)
 
 
 @pytest.mark.parametrize("sign", ["1", "-1"])
@@ -76,7 +83,7 @@ def test_angles_count_from_the_horizontal_and_with_the_driven_joint(sign):
     # gravity in the plane points down: its angle is -90 deg
     model = mujoco.MjModel.from_xml_string(text)
     normal = float(sign) * rotation(TILT)[:, 2]
-    along = rotation(TILT) @ loop.along
+    along = rotation(TILT) @ loop.axes[0]
     gravity = model.opt.gravity - (model.opt.gravity @ normal) * normal
     assert along @ gravity == approx(0.0, abs=1e-12)
     assert np.cross(normal, along) @ gravity < 0.0
@@ -411,15 +418,14 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
     assert loop.lengths == approx((d, c, b, a))
     assert loop.cut == "A"
     other = loop_of(planar.text(), drive="O2").from_other_end
-    if other.axis @ loop.axis < 0.0:
+    if other.axes[2] @ loop.axes[2] < 0.0:
         other = other.seen_from_behind()
-    for name in ("cut", "bodies", "hinges", "senses"):
+    for name in ("cut", "cut_bars", "bodies", "hinges", "senses"):
         assert getattr(other, name) == getattr(loop, name), name
     turned = np.subtract(other.angles, loop.angles)
     np.testing.assert_allclose(np.exp(1j * (turned - turned[0])), 1.0)
     assert other.lengths == approx(loop.lengths)
-    for place, point in loop.points.items():
-        np.testing.assert_allclose(other.points[place], point, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(other.seen_from_behind().axes), 1.0)
     with raises(InputError, match="drives no four-bar"):
         loop_of(planar.text(), drive="A")
     with raises(InputError, match="no such joint; the file has: joint 0, O2"):

@@ -655,31 +655,16 @@ class _Finder:
         hinges = {pin: joint for pin, joint in at_pins if joint is not None}
         cut = next((pin for pin in PINS if pin not in hinges), None)
         bodies = dict(zip(ENDS, groups, strict=True))
-        sides = {
-            pin: 1.0 if self.join(joint)[0] in bodies[PINS[pin][1]] else -1.0
-            for pin, joint in hinges.items()
-        }
+        bars = {root: bar for bar, group in bodies.items() for root in group}
         normal = find_mean_axis(data, hinges.values())
-        turns_ground = self.join(driven)[0] in bodies[1]
+        turns_ground = bars[self.join(driven)[0]] == 1
         if (data.xaxis[driven] @ normal > 0.0) == turns_ground:
             normal = -normal
-        places = {
-            (bar, pin): data.xanchor[joint].copy()
-            for pin, joint in hinges.items()
-            for bar in PINS[pin]
-        }
-        if cut is not None:
-            ends = find_ends(self.model, data, chain.number)
-            for body, place in zip(chain.ends, ends, strict=True):
-                bar = next(one for one in PINS[cut] if self.root[body] in bodies[one])
-                places[bar, cut] = place
-        along = self._choose_along(normal, places[1, "O4"] - places[1, "O2"])
-
-        def to_body(bar: int, vector: Array) -> Array:
-            """Return a vector of the world in the frame of a bar's first body."""
-            rotation = data.xmat[bodies[bar][0]].reshape(3, 3)
-            return np.asarray(rotation.T @ vector)
-
+        senses = {}
+        for pin, joint in hinges.items():
+            turned, _ = self.join(joint)
+            side = 1.0 if bars[turned] == PINS[pin][1] else -1.0
+            senses[pin] = math.copysign(1.0, side * data.xaxis[joint] @ normal)
         loop = RobotLoop(
             name=chain.name,
             equality=chain.number,
@@ -688,20 +673,14 @@ class _Finder:
             bodies=bodies,
             ground=chain.ground_name,
             hinges=hinges,
-            senses={
-                pin: math.copysign(1.0, side * data.xaxis[hinges[pin]] @ normal)
-                for pin, side in sides.items()
-            },
-            points={
-                (bar, pin): to_body(bar, place - data.xpos[bodies[bar][0]])
-                for (bar, pin), place in places.items()
-            },
-            axis=to_body(1, normal),
-            along=to_body(1, along),
+            senses=senses,
+            cut_bars=tuple(bars[self.root[end]] for end in chain.ends),
+            axes=np.eye(3),
             misaligned=self._measure_axes(chain)[0] or 0.0,
             qpos=data.qpos.copy(),
             held=tuple(sorted({*range(self.model.njnt)} - {*hinges.values()})),
         )
+        loop = replace(loop, axes=self._choose_axes(loop, normal))
         loop = replace(
             loop,
             lines=tuple(map(LoopFrame(loop, data).line, ENDS)),
@@ -730,22 +709,23 @@ class _Finder:
             remarks=tuple(remarks),
         )
 
-    def _choose_along(self, normal: Array, line: Array) -> Array:
-        """Return the unit vector x of a plane in world axes, (3,).
+    def _choose_axes(self, loop: RobotLoop, normal: Array) -> Array:
+        """Return x, y and the normal of a loop's plane in the frame of its ground.
 
-        The direction is across gravity unless the plane is level, else along the line
-        of the ground.
+        x is across gravity unless the plane is level, else along the line of the
+        ground.
         """
         gravity = self.model.opt.gravity
         in_plane = gravity - (gravity @ normal) * normal
-        size = float(np.linalg.norm(in_plane))
-        if size > LEVEL_PLANE * float(np.linalg.norm(gravity)):
-            return np.asarray(np.cross(-in_plane / size, normal))
-        line = line - (line @ normal) * normal
-        length = float(np.linalg.norm(line))
-        if length > 0.0:
-            return np.asarray(line / length)
-        return np.asarray(np.linalg.svd(normal[None])[2][1])
+        along = np.cross(normal, in_plane)
+        if np.linalg.norm(in_plane) <= LEVEL_PLANE * np.linalg.norm(gravity):
+            frame = LoopFrame(loop, self.data)
+            line = frame.locate(1, "O4") - frame.locate(1, "O2")
+            along = line - (line @ normal) * normal
+        along = along / (np.linalg.norm(along) or 1.0)
+        ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
+        axes = np.array([along, np.cross(normal, along), normal])
+        return np.asarray(axes @ ground)
 
     def _choose_driven(
         self, ends: list[int | None], chain: _Chain

@@ -143,8 +143,8 @@ class LoopInside:
 
         dq = basis x + step phi,    turn . dq = phi,    turn . basis = 0,
 
-    with phi the turn of the commanded bar and x that of the hinges that follow: a
-    couple on the bar is the generalized force `turn`, whichever hinges bear the bar.
+    with phi the turn of the commanded bar and x what follows: a couple on the bar is
+    the generalized force `turn`, whichever hinges bear the bar.
     """
 
     def __init__(
@@ -188,14 +188,12 @@ class LoopInside:
         self.held = [dof for dof in range(model.nv) if dof not in self.moving]
         self._evaluate_closure(loop.qpos)
         self.turn = self._find_turn()
-        self.lead = max(dof for dof in self.moving if self.turn[dof])
-        """Degree of freedom that follows from the others and the commanded angle."""
-        self.passive = [dof for dof in self.moving if dof != self.lead]
-        self.step = np.zeros(model.nv)
-        self.step[self.lead] = self.turn[self.lead]
-        self.basis = np.zeros((model.nv, len(self.passive)))
-        self.basis[self.passive, range(len(self.passive))] = 1.0
-        self.basis[self.lead] = -self.turn[self.lead] * self.turn[self.passive]
+        self.lead = int(np.flatnonzero(self.turn)[-1])
+        """Degree of freedom of the driven hinge, if the file has one."""
+        self.step = self.turn / (self.turn @ self.turn)
+        of_moving = self.turn[None, self.moving]
+        self.basis = np.zeros((model.nv, len(joints) - 1))
+        self.basis[self.moving] = np.linalg.svd(of_moving)[2][1:].T
         crank, coupler, output = map(Bar, loop.met[1:])
         self.linkage = FourBar(loop.met[0], crank, coupler, output, loop.angles[0])
         first, second = (loop.angles[one - 1] for one in FOLLOWING[bar])
@@ -305,24 +303,35 @@ class LoopInside:
         start = self._theta[self.bar - 1]
         strides = max(math.ceil(abs(wanted - start) / _STRIDE), 1)
         angles = np.linspace(start, wanted, strides + 1)
-        signs = find_signs(self.linkage, angles, self.assembly, self.bar)
-        qpos = self._follow(angles, signs)
+        qpos = self._follow(self.turn_bars(angles))
         return qpos if self.close_gap(qpos) else None
 
-    def _follow(self, angles: Array, signs: NDArray[np.int8]) -> Array:
-        """Return the pose at the last of some angles of the commanded bar, (nq,).
+    def turn_bars(self, angles: Array, signs: NDArray[np.int8] | None = None) -> Array:
+        """Return theta_1 to theta_4 at angles of the commanded bar, (n, 4), rad.
 
-        Angles at which the loop is open are passed over. `signs`: of the sine of the
-        angle from the first bar that follows to the second.
+        The others go on from the last pose; where the loop is open they are NaN.
+        `signs`: of the sine of the angle from the first bar that follows to the second;
+        None: those of the assembly of the pose.
+        """
+        if signs is None:
+            signs = find_signs(self.linkage, angles, self.assembly, self.bar)
+        closed = close(self.linkage, angles, signs, self.bar)
+        theta = np.full((len(angles), len(self._theta)), self.linkage.ground_angle)
+        theta[:, [bar - 1 for bar in FOLLOWING[self.bar]]] = closed.theta.T
+        path = [self._theta, *theta[closed.assembled]]
+        theta[closed.assembled] = np.unwrap(path, axis=0)[1:]
+        theta[:, self.bar - 1] = angles
+        return theta
+
+    def _follow(self, theta: Array) -> Array:
+        """Return the pose at the last angles that `turn_bars` returns, (nq,).
+
+        Those at which the loop is open are passed over.
         """
         loop = self.loop
-        closed = close(self.linkage, angles, signs, self.bar).theta
-        theta = np.full((len(angles), len(loop.angles)), loop.angles[0])
-        theta[:, self.bar - 1] = angles
-        theta[:, [bar - 1 for bar in FOLLOWING[self.bar]]] = closed.T
-        path = [self._theta, *theta[np.isfinite(closed[0])]]
-        self._theta = np.unwrap(path, axis=0)[-1]
-        self._theta[self.bar - 1] = angles[-1]
+        closed = theta[np.isfinite(theta).all(axis=1)]
+        self._theta = [self._theta, *closed][-1]
+        self._theta[self.bar - 1] = theta[-1, self.bar - 1]
         turned = self._theta - loop.angles
         qpos = loop.qpos.copy()
         for pin, joint in loop.hinges.items():
@@ -336,7 +345,7 @@ class LoopInside:
         None where it does not close.
         """
         angle = np.array([self.loop.angles[self.bar - 1]])
-        qpos = self._follow(angle, -self.signs)
+        qpos = self._follow(self.turn_bars(angle, -self.signs))
         # put together anew, no spring is wound by more than half a turn
         for joint in {*self.loop.hinges.values()} - {self.joint}:
             address = self.model.jnt_qposadr[joint]
@@ -400,7 +409,7 @@ class LoopInside:
         data = self.closing
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
-        normal = data.xmat[self.loop.bodies[1][0]].reshape(3, 3) @ self.loop.axis
+        normal = LoopFrame(self.loop, data).normal
         normals = dict.fromkeys(self.loop.closures, normal)
         return evaluate_closures(self.closure, data, normals)
 
@@ -595,7 +604,7 @@ class LoopInside:
             changes = [leave(turns + step) for step in np.eye(len(turns))]
             return np.column_stack(changes) - leave(turns)[:, None]
 
-        start = np.zeros(len(self.passive))
+        start = np.zeros(len(self.moving) - 1)
         return find_forces(root(leave, start, jac=differ, tol=_BALANCED).x)
 
     def _read_forces(self, data: mujoco.MjData) -> Array:

@@ -123,12 +123,13 @@ class RobotLoop:
     senses: Mapping[str, float]
     """+1 where the joint's angle grows as the second bar of the pin turns
     counter-clockwise against the first; else -1."""
-    points: Mapping[tuple[int, str], Array]
-    """(bar, pin): the pin in the frame of the bar's first body, (3,), m."""
-    axis: Array
-    """Unit normal of the plane in the frame of the ground's first body, (3,)."""
-    along: Array
-    """Unit vector of the plane that angles are counted from, same frame, (3,)."""
+    cut_bars: tuple[int, ...]
+    """Bars that the two ends of the equality are on; empty where it is a weld."""
+    axes: Array
+    """x, from which angles are counted, y, and the normal of the plane, (3, 3).
+
+    They are unit vectors in the frame of the ground's first body.
+    """
     misaligned: float
     """Largest angle between two axes, rad."""
     qpos: Array
@@ -202,7 +203,7 @@ class RobotLoop:
         """
         return replace(
             self,
-            axis=-self.axis,
+            axes=self.axes * [[1.0], [-1.0], [-1.0]],
             lines=tuple(line.conjugate() for line in self.lines),
             stated_lines=tuple(line.conjugate() for line in self.stated_lines),
             senses={pin: -sense for pin, sense in self.senses.items()},

@@ -29,9 +29,8 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, PINS, Bar, FourBar, Lengths
 from fourbar.mjcf.model import write_six_digits
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, find_signs
-from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN, Motion, Sweep
+from fourbar.scene.motion import BRANCH_NAMES, OPEN, Motion, Sweep
 from fourbar.show.panels import split_runs
-from fourbar.solving import solve
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     climb,
@@ -279,11 +278,15 @@ class SceneOfLoop(SeenLoop):
             bars[bar] = Bar(lengths[bar - 1], mass, round_off(inertia), centre)
         theta_1 = _round_angle(self.loop.angles[0])
         linkage = FourBar(lengths[0], bars[2], bars[3], bars[4], theta_1)
-        *ends, at_start = self._find_sweep(linkage)
+        self.inside = LoopInside(self.model, self.loop)
+        *ends, at_start = self._find_sweep()
         self.shift = math.tau * math.ceil((-math.pi - ends[0]) / math.tau)
         start, stop = (_round_angle(end + self.shift) for end in ends)
         theta_2 = Sweep(start, stop, SWEEP_INTERVALS) if stop > start else start
-        branch = self._find_branch(linkage, self.loop.angles[1] + self.shift)
+        branch = OPEN
+        if not is_in_line(self.loop.angles, 2):
+            in_pose = np.array([self.loop.angles[1] + self.shift])
+            branch = int(find_signs(linkage, in_pose, self.inside.signs)[0])
         self._remark_assembly(branch)
         motion = Motion(theta_2, speed, branch=branch)
         effects = tuple(self._list_effects(armature, at_start))
@@ -375,7 +378,7 @@ class SceneOfLoop(SeenLoop):
         return name_joint(self.model, self.loop.hinges[pin])
 
     def _list_effects(
-        self, armature: dict[str, float], at_start: dict[str, float]
+        self, armature: dict[str, float], at_start: list[float]
     ) -> Iterator[Effect]:
         """List the effects, the pins in their order."""
         model = self.model
@@ -396,7 +399,7 @@ class SceneOfLoop(SeenLoop):
             yield Flywheel(round_off(armature["O2"]), 2)
 
     def _list_springs(
-        self, hinges: dict[str, int], at_start: dict[str, float]
+        self, hinges: dict[str, int], at_start: list[float]
     ) -> Iterator[tuple[str, float, float, float]]:
         """List pin, stiffness, rest angle and preload of the hinges' springs.
 
@@ -411,7 +414,8 @@ class SceneOfLoop(SeenLoop):
             if not stiffness:
                 continue
             rest = self.rest_angle(pin, spring=True)
-            turns = math.tau * round((at_start[pin] - rest) / math.tau)
+            first, second = (at_start[bar - 1] for bar in PINS[pin])
+            turns = math.tau * round((second - first - rest) / math.tau)
             angle = _round_angle(math.remainder(rest, math.tau))
             yield pin, round_off(stiffness), angle, round_off(stiffness * turns)
 
@@ -434,16 +438,16 @@ class SceneOfLoop(SeenLoop):
             from_pin = (round_off(place[0]), _round_angle(place[1]))
             yield Load(bar, (size, angle), from_pin=from_pin)
 
-    def _find_sweep(self, linkage: FourBar) -> tuple[float, float, dict[str, float]]:
+    def _find_sweep(self) -> tuple[float, float, list[float]]:
         """Follow the loop over the range of the driven hinge.
 
         The range ends where the loop does not assemble or another hinge stops it.
         Of one longer than a turn, a turn is taken from the pose, or as near to it as
-        the range allows. Return theta_2 at the ends, rad, and the angle between the
-        bars of each pin at the first of them, rad.
+        the range allows. Return theta_2 at the ends, and theta_1 to theta_4 at the
+        first of them, rad.
         """
         theta_2 = self.loop.angles[1]
-        low, high = _find_assembling(linkage, theta_2)
+        low, high = _find_assembling(self.inside.linkage, theta_2)
         if stops := self.stops("O2"):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
@@ -453,9 +457,13 @@ class SceneOfLoop(SeenLoop):
         both_ways = np.linspace([low, high], near, RANGE_INTERVALS + 1)
         angles = np.union1d(both_ways, theta_2)
         in_pose = int(np.searchsorted(angles, theta_2))
-        betas = self._follow(linkage, angles, in_pose)
+        theta = self.inside.turn_bars(angles)
+        turns = np.round((theta[in_pose] - self.loop.angles) / math.tau)
+        theta -= math.tau * turns
         free = (angles >= low) & (angles <= high)
-        for pin, beta in betas.items():
+        for pin in self.hinge:
+            first, second = PINS[pin]
+            beta = theta[:, second - 1] - theta[:, first - 1]
             least, most = self.stops(pin) or (-math.inf, math.inf)
             free &= beta >= least - OUTSIDE_A_RANGE
             free &= beta <= most + OUTSIDE_A_RANGE
@@ -471,44 +479,8 @@ class SceneOfLoop(SeenLoop):
         low, high = angles[run[[0, -1]]].tolist()
         start = max(low, min(near, high - math.tau))
         stop = min(high, start + math.tau)
-        at_start = {
-            pin: float(np.interp(start, angles, beta)) for pin, beta in betas.items()
-        }
+        at_start = [float(np.interp(start, angles, column)) for column in theta.T]
         return start, stop, at_start
-
-    def _follow(
-        self,
-        linkage: FourBar,
-        angles: Array,
-        in_pose: int,
-    ) -> dict[str, Array]:
-        """Return the angle between the bars of each hinge along theta_2, rad.
-
-        Continuous angles are counted from those of the loop in its pose.
-        """
-        loop = self.loop
-        branch = self._find_branch(linkage, loop.angles[1])
-        solution = solve(Scene(linkage, Motion(angles, branch=branch)), "position")
-        ground = np.full_like(angles, linkage.ground_angle)
-        thetas = np.array([ground, angles, solution.theta_3, solution.theta_4])
-        turns = np.round((loop.angles - thetas[:, in_pose]) / math.tau)
-        thetas += math.tau * turns[:, None]
-        return {
-            pin: thetas[second - 1] - thetas[first - 1]
-            for pin, (first, second) in PINS.items()
-            if pin in loop.hinges
-        }
-
-    def _find_branch(self, linkage: FourBar, theta_2: float) -> int:
-        """Return the branch whose output stands as in the pose.
-
-        `theta_2`: that of the pose, counted in the turns of the sweep.
-        """
-        if is_in_line(self.loop.angles, 2):
-            return OPEN
-        _, _, theta_3, theta_4 = self.loop.angles
-        sign = OPEN if math.sin(theta_4 - theta_3) > 0.0 else CROSSED
-        return int(find_signs(linkage, np.array([theta_2]), sign)[0])
 
     def _remark_assembly(self, branch: int) -> None:
         """Say where the pose does not tell the assembly."""
@@ -521,7 +493,7 @@ class SceneOfLoop(SeenLoop):
                 " the pose before closing, which does not tell the assembly: it closed"
                 f" to the {BRANCH_NAMES[branch]} one"
             )
-            reflected = LoopInside(self.model, loop).reflect()
+            reflected = self.inside.reflect()
             if pose := write_pose(self.model, loop, reflected):
                 text += f"; --pose {pose} closes to the other"
         else:

@@ -12,6 +12,7 @@ from fourbar.linkage import ENDS, FIRST_PIN, PINS
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     EQUALITY_KINDS,
+    find_ends,
     find_roots,
     is_enabled,
     list_actuators,
@@ -47,12 +48,11 @@ class LoopFrame:
         self.loop = loop
         self.data = data
         ground = data.xmat[loop.bodies[1][0]].reshape(3, 3)
-        self.normal = ground @ loop.axis
-        along = ground @ loop.along
-        across = np.cross(self.normal, along)
+        axes = loop.axes @ ground.T
+        self.normal: Array = axes[2]
         cos = math.cos(loop.turned)
         sin = math.sin(loop.turned)
-        self.axes = np.array([cos * along + sin * across, cos * across - sin * along])
+        self.axes: Array = np.array([[cos, sin], [-sin, cos]]) @ axes[:2]
         """x and y of the scene in world axes, (2, 3)."""
 
     def in_plane(self, vector: Array) -> Array:
@@ -65,9 +65,11 @@ class LoopFrame:
 
     def locate(self, bar: int, pin: str) -> Array:
         """Locate a pin of a bar in world axes, (3,), m."""
-        body = self.loop.bodies[bar][0]
-        turn = self.data.xmat[body].reshape(3, 3)
-        return np.asarray(self.data.xpos[body] + turn @ self.loop.points[bar, pin])
+        loop = self.loop
+        if pin in loop.hinges:
+            return np.asarray(self.data.xanchor[loop.hinges[pin]])
+        ends = find_ends(self.data.model, self.data, loop.equality)
+        return np.asarray(ends[loop.cut_bars.index(bar)])
 
     def line(self, bar: int) -> complex:
         """Return a bar's line in the plane, from its first pin to the second, m."""
