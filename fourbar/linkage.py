@@ -16,7 +16,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.errors import ELSEWHERE, InputError, expect, write_in_units
+from fourbar.errors import ELSEWHERE, InputError, expect, name_unit, write_in_units
 from fourbar.quantities import PIN_FORCES
 
 Lengths = tuple[float, float, float, float]
@@ -62,6 +62,7 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY_NUMBER) -
     if type(value) is float and math.isfinite(value) and is_within(value, bound):
         return value
     number = math.nan
+    wanted = f"must be {bound}, like {_show(unit)}"
     if unit != "1":
         value = _read_quantity(value)
     if unit != "1" and isinstance(value, str):
@@ -70,14 +71,18 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY_NUMBER) -
         try:
             number = to_si(value, unit)
         except UnitError as error:
-            like = f'must be {bound}, in {unit} or with a unit, like "1 {unit}"'
-            raise InputError(key, value, f"{error}; {like}") from None
+            raise InputError(key, value, f"{error}; {wanted}") from None
     elif not isinstance(value, _NO_NUMBERS) and not getattr(value, "shape", ()):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number) or not is_within(number, bound):
-        raise InputError(key, value, f"must be {bound}")
+        raise InputError(key, value, wanted)
     return number
+
+
+def _show(*units: str) -> str:
+    """Show a number of each unit, as an error says what is allowed."""
+    return ", ".join("1" if unit == "1" else f'"1 {name_unit(unit)}"' for unit in units)
 
 
 def require_whole(key: str, value: object, among: Container[int], allowed: str) -> int:
@@ -136,7 +141,7 @@ def require_numbers(
         array = np.asarray(None)
     is_numeric = array.dtype.kind in "iuf"
     if not is_numeric or array.ndim > 1 or not np.isfinite(array).all():
-        raise InputError(key, value, f"{allowed}, shape () or (n,)")
+        raise InputError(key, value, f"{allowed}, one or a list, like {_show(unit)}")
     return array.astype(float)
 
 
@@ -173,7 +178,7 @@ class Declared(NamedTuple):
     @property
     def units(self) -> tuple[str, str]:
         """Units of both numbers of a pair."""
-        return self.unit, self.pair
+        return self.unit, self.pair or self.unit
 
     @property
     def bounds(self) -> tuple[str, str]:
@@ -226,9 +231,9 @@ class Text(NamedTuple):
 
     def check(self, key: str, value: Any) -> str:
         """Return the text; InputError for what is none."""
-        expect(key, value, str)
-        text: str = value
-        return text
+        if not isinstance(value, str):
+            raise InputError(key, value, "must be a text in quotes")
+        return value
 
 
 class Whole(NamedTuple):
@@ -250,6 +255,11 @@ class Listed(NamedTuple):
 
     unit: str
     key: str = ""
+
+    @property
+    def units(self) -> tuple[str]:
+        """Unit of each number."""
+        return (self.unit,)
 
     def check(self, key: str, value: Any) -> Any:
         """Return the numbers as a tuple of floats; InputError for others."""
@@ -373,8 +383,8 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     try:
         size, other = value
     except (TypeError, ValueError):
-        names = "size, angle" if by.pair == "rad" else ", ".join(by.units)
-        raise InputError(key, value, f"must be a pair ({names})") from None
+        form = f"must be a pair like [{_show(*by.units)}]"
+        raise InputError(key, value, form) from None
     unit, second = by.units
     bound, of_second = by.bounds
     return require(key, size, unit, bound), require(key, other, second, of_second)
@@ -453,6 +463,7 @@ class Bar(Described):
                 "diameter",
                 self.diameter,
                 "must be left out beside a section",
+                unit="m",
             )
         modulus = self.section_modulus
         if modulus is not None and not 0.0 < modulus < math.inf:
@@ -468,12 +479,14 @@ class Bar(Described):
                 "density",
                 self.density,
                 "needs the cross-section: section or diameter",
+                unit="kg/m^3",
             )
         if self.density is not None and self.mass_per_length is not None:
             raise InputError(
                 "density",
                 self.density,
                 "must be left out beside mass_per_length",
+                unit="kg/m^3",
             )
         stated = self.mass
         object.__setattr__(self, "mass", self.weigh())
@@ -483,6 +496,7 @@ class Bar(Described):
                 stated,
                 "must be left out (0 in dataclasses.replace): density or"
                 " mass_per_length states it",
+                unit="kg",
             )
 
     @property

@@ -29,7 +29,7 @@ from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Entry, SceneFile, split_key
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
 from fourbar.files.scene_text import write_drawn_scene, write_new_scene
-from fourbar.linkage import PINS, POSITIVE
+from fourbar.linkage import PINS, POSITIVE, Declared
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene
 from fourbar.scene.motion import (
@@ -592,7 +592,8 @@ def _require_readable_units(name: str) -> None:
 def _read_typed_pressure(text: str) -> str:
     """Return a pressure as it was typed; InputError where it is none."""
     if text.strip():
-        Entry(SceneFile("workbench"), "pressure", text).quantity("Pa", POSITIVE)
+        pressure = Entry(SceneFile("workbench"), "pressure", text)
+        pressure.check(Declared("Pa", POSITIVE))
     return text.strip()
 
 

@@ -22,6 +22,7 @@ from fourbar.linkage import (
     MOVING_BARS,
     PINS,
     Bar,
+    Declared,
     FourBar,
 )
 from fourbar.quantities.units import half_unit_of_text
@@ -115,7 +116,7 @@ def read_ground(lengths: Entry) -> DrawnGround:
     if angle.value is not None:
         raise angle.refuse("must be left out: x and y of the ground state its angle")
     ground.table("xy")
-    x, y = (ground[axis].quantity("m") for axis in "xy")
+    x, y = (ground[axis].check(Declared("m")) for axis in "xy")
     length = math.hypot(x, y)
     if not 0.0 < length < math.inf:
         raise ground.refuse("must be coordinates of O4 from O2, where it does not lie")

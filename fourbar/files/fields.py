@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import cycle
 from typing import Any, Self
 
 from fourbar.effects.effect import PinRows
@@ -26,7 +27,6 @@ from fourbar.errors import (
     suggest_keys,
 )
 from fourbar.linkage import (
-    ANY_NUMBER,
     PINS,
     REQUIRED_NUMBER,
     Declared,
@@ -36,13 +36,10 @@ from fourbar.linkage import (
     OfBar,
     OneOf,
     Part,
-    is_within,
     list_declared,
 )
 from fourbar.quantities.units import (
     UNIT_MISSING,
-    UnitError,
-    to_si,
 )
 from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
 
@@ -83,8 +80,8 @@ class SceneFile:
         self.name = name
         self.drawing: Any = None
         """Drawing that states the pins, or the ground of a scene of lengths."""
-        self.drawn: dict[str, float] = {}
-        """Numbers that the word "drawn" stands for in a motion, by their names."""
+        self.drawn: dict[str, Any] = {}
+        """What the word "drawn" stands for in a motion, by the names of its entries."""
         self.bars: dict[str, int] = {}
         """Bar of each named point, which a place at it need not state again."""
 
@@ -98,14 +95,10 @@ class Entry:
     value : as TOML has it; None: the file has no such entry.
     """
 
-    QUANTITY = 'with a unit, like "1 {}"'
-    """The form of a number of a unit, as errors say it. Likewise of several, and of a
-    polar pair.
-    """
-    QUANTITIES = '["1 {0}", "2 {0}"]'
-    POLAR = '["1 {0}", "0 deg"]'
-    COORDINATES = 'or {{ x = "1 {0}", y = "0 {0}" }}'
-    """A place or a force by its components; empty where it has to be polar."""
+    UNSTATED: tuple[type, ...] = (int, float)
+    """Types of what states no number of a unit."""
+    FORM = f'{UNIT_MISSING}; it is written like "1 {{}}"'
+    """Form of a number of a unit, as errors say it."""
 
     def __init__(self, file: SceneFile, key: str, value: Any) -> None:
         self.file = file
@@ -144,89 +137,37 @@ class Entry:
                 raise self[name].refuse(f"unknown key; {known}")
         return self.value
 
-    def text(self) -> str:
-        """Read a string."""
-        if not isinstance(self.value, str):
-            raise self.refuse("must be a text in quotes")
-        return self.value
-
     def check(self, by: Any) -> Any:
-        """Read a value that stands as its declaration has it, like a word or a bar."""
-        try:
-            return by.check(self.key, self.value)
-        except InputError as error:
-            raise self.refuse(error.allowed) from None
+        """Read a value as its declaration has it, each number with its unit.
 
-    def quantity(self, unit: str, bound: str = ANY_NUMBER) -> float:
-        """Read a number in `unit`; with unit "1" it has none."""
-        if unit == "1":
-            number: float = self.check(Declared(unit, bound))
-            return number
-        wanted = f"must be {bound} {self.QUANTITY.format(name_unit(unit))}"
-        number = self.in_si(unit, wanted)
-        if not is_within(number, bound):
-            raise self.refuse(wanted)
-        return number
-
-    def in_si(self, unit: str, wanted: str) -> float:
-        """Convert a text with a unit to a number in `unit`."""
+        A magnitude and an angle may be stated by x and y.
+        """
         value = self.value
-        if type(value) in (int, float):
-            raise self.refuse(f"{UNIT_MISSING}; {wanted}")
+        if isinstance(value, dict) and getattr(by, "pair", "") == "rad":
+            self.table("xy")
+            x, y = (self[axis].check(Declared(by.unit)) for axis in "xy")
+            value = convert_to_polar(x, y)
+        numbers = value if isinstance(value, list) else [value]
+        for number, unit in zip(numbers, cycle(getattr(by, "units", ["1"]))):
+            if unit != "1" and isinstance(number, self.UNSTATED):
+                raise self.holding(number).refuse(self.FORM.format(name_unit(unit)))
         if value == DRAWN_WORD:
-            _, _, name = self.key.partition("motion.")
-            name = name.partition(".")[0]
-            if name in self.file.drawn:
-                return self.file.drawn[name]
-            allowed = "stands for what a drawing has, and the scene has no [pins]; "
-            raise self.refuse(allowed + wanted)
-        if not isinstance(value, str):
-            raise self.refuse(wanted)
+            name = self.key.removeprefix("motion.").partition(".")[0]
+            value = self.file.drawn.get(name, value)
         try:
-            return to_si(value, unit)
-        except UnitError as error:
-            raise self.refuse(f"{error}; {wanted}") from None
+            return by.check(self.key, value)
+        except InputError as error:
+            raise self.holding(error.value).refuse(error.allowed) from None
 
     def declared(self, by: Declared) -> Any:
-        """Read a number, or a pair of numbers, as it is declared."""
+        """Read a number, or a pair of numbers, which may be left out."""
         if self.value is None and by.left_out is not REQUIRED_NUMBER:
             return by.left_out
-        if by.pair:
-            return self.pair(by)
-        return self.quantity(by.unit, by.bound)
+        return self.check(by)
 
     def numbers(self, numbers: Mapping[str, Declared]) -> dict[str, Any]:
         """Read some numbers of this table, by name."""
         return {name: self[name].declared(by) for name, by in numbers.items()}
-
-    def pair(self, by: Declared) -> tuple[float, float]:
-        """Read a declared pair: two numbers, or { x, y } of a magnitude and angle."""
-        is_polar = by.pair == "rad"
-        if is_polar and isinstance(self.value, dict) and self.COORDINATES:
-            self.table("xy")
-            x, y = (self[name].quantity(by.unit) for name in "xy")
-            if not math.isfinite(math.hypot(x, y)):
-                raise self.refuse("must have a finite size")
-            return convert_to_polar(x, y)
-        if not isinstance(self.value, list) or len(self.value) != 2:
-            form = f'["1 {by.unit}", "1 {by.pair}"]'
-            if by.unit == "1":
-                form = "[1, 1]"
-            if is_polar:
-                form = f"{self.POLAR} {self.COORDINATES}".strip()
-                form = form.format(name_unit(by.unit))
-            raise self.refuse(f"must be a pair like {form}")
-        first, second = map(type(self).quantity, self.entries(), by.units, by.bounds)
-        return first, second
-
-    def quantities(self, unit: str) -> tuple[float, ...]:
-        """Read a list of numbers with units, in `unit`."""
-        if not isinstance(self.value, list):
-            form = f"like {self.QUANTITIES.format(name_unit(unit))}"
-            if unit == "1":
-                form = "of numbers without a unit"
-            raise self.refuse(f"must be a list {form}")
-        return tuple(entry.quantity(unit) for entry in self.entries())
 
     def described(self, kind: Any, **stated: Any) -> Any:
         """Read a description of a class by the declarations of its fields.
@@ -240,7 +181,7 @@ class Entry:
             return kind(self._read_rows(kind.numbers))
         fields: Any = list_declared(kind)
         if [field.key for field in fields] == _PAIR:
-            return kind(*self.pair(Declared(fields[0].by.unit, pair="rad")))
+            return kind(*self.check(Declared(fields[0].by.unit, pair="rad")))
         if [field.key for field in fields if isinstance(field.by, Entries)] == [""]:
             return kind(self.holding({"": self.value})._read_field(fields[0]))
         self.table(list_keys(kind))
@@ -297,11 +238,7 @@ class Entry:
             return tuple(one.described(by.kind) for one in entry.entries())
         if isinstance(by, Part):
             return entry.described(by.kind)
-        if isinstance(by, Listed):
-            return entry.quantities(by.unit)
-        if not isinstance(by, Declared):
-            return entry.check(by)
-        return entry.declared(by)
+        return entry.check(by)
 
     def _read_rows(self, numbers: Mapping[str, Declared]) -> tuple[Any, ...]:
         """Read what each pin has: one number, or a table of several."""
@@ -358,7 +295,7 @@ class Entry:
                 "is a place of a moving bar: it is drawn where [pins] states the"
                 " linkage; here from_pin states it"
             )
-        z = self.file.drawing.into_bar(bar, drawn.pair(DRAWN_PLACE))
+        z = self.file.drawing.into_bar(bar, drawn.check(DRAWN_PLACE))
         return convert_to_polar(z.real, z.imag)
 
 

@@ -44,9 +44,12 @@ from fourbar.linkage import (
     BAR_NUMBERS,
     POSITIVE,
     Bar,
+    Declared,
     FourBar,
+    Listed,
     OfBar,
     OneOf,
+    Text,
 )
 from fourbar.quantities import Array
 from fourbar.quantities.units import half_unit_of_text
@@ -232,7 +235,7 @@ def read_scene(document: Entry, folder: str) -> Scene:
     pictures = []
     for name, bar in MOVING_BAR_NUMBERS.items():
         if "picture" in bars.value.get(name, {}):  # its file is read when it is shown
-            pictures.append(Picture(bar, bars[name]["picture"].text(), folder))
+            pictures.append(Picture(bar, bars[name]["picture"].check(Text()), folder))
     settled = drive and drive.with_places(settler(linkage, points))
     motion = _read_motion(top["motion"], drawing, settled)
     stated_loads = tuple(map(_read_load, loads.entries()))
@@ -251,8 +254,8 @@ def read_scene(document: Entry, folder: str) -> Scene:
         drive_bar,  # type: ignore[arg-type]
         stated_loads,
         tuple(stated_effects),
-        top["title"].text(),
-        top["source"].text(),
+        top["title"].check(Text()),
+        top["source"].check(Text()),
         tuple(pictures),
         points,
         drive=drive,
@@ -327,21 +330,16 @@ def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]
 def _read_bar(bar: Entry, length: float, number: int) -> Bar:
     if bar.value is None:
         return Bar(length)
-    declared = dict(Bar.numbers)
-    del declared["length"]
-    bar.table((*declared, "picture"))
-    stated = {}
+    _, *keys = Bar.numbers  # the length stands elsewhere
+    stated = dict(bar.table((*keys, "picture")))
+    stated.pop("picture", None)
+    known: dict[str, Any] = {"length": length}
     if bar["centre"].is_drawn():
-        stated["centre"] = bar["centre"].locate(number)
-        del declared["centre"]
-    numbers = bar.numbers(declared) | stated
-    inertia = numbers["mass"] * length * length
-    if numbers["inertia"] is None and not math.isfinite(inertia):
+        known["centre"] = bar["centre"].locate(number)
+    read: Bar = bar.holding(stated).described(Bar, **known)
+    if not math.isfinite(read.moment_of_inertia):
         raise bar["mass"].refuse("must leave the inertia m L^2/12 a finite number")
-    try:
-        return Bar(length, **numbers)
-    except InputError as error:  # which knows of one bar alone
-        raise bar[error.key].refuse(error.allowed) from None
+    return read
 
 
 def _read_motion(
@@ -353,11 +351,11 @@ def _read_motion(
     """
     entry = motion.table((*Motion.numbers, "side", "branch", "free", "law"))
     if drawing is not None:
-        motion.file.drawn = list_drawn(drawing, drive)
-        by_stroke = not entry.keys().isdisjoint(STROKE_COMMAND)
-        if entry.get("side", DRAWN_WORD if by_stroke else None) == DRAWN_WORD:
-            side = find_side_of_cylinder(drawing, drive)
-            motion = motion.holding({**entry, "side": side})
+        motion.file.drawn |= list_drawn(drawing, drive)
+        if not entry.keys().isdisjoint(STROKE_COMMAND):
+            motion = motion.holding({"side": DRAWN_WORD, **entry})
+        if motion["side"].value == DRAWN_WORD:
+            motion.file.drawn["side"] = find_side_of_cylinder(drawing, drive)
     arguments: dict[str, Any] = {}
     for name, by in Motion.numbers.items():
         stated = motion[name]
@@ -393,9 +391,9 @@ def _read_commanded(entry: Entry, unit: str) -> float | Array | Sweep | FromLimi
         form = '{ from = "0 deg", to = "360 deg", steps = 360 }'
         raise entry.refuse(f"is no number; a sweep is written {form}")
     if isinstance(value, str | int | float):
-        return entry.quantity(unit)
+        return entry.check(Declared(unit))  # type: ignore[no-any-return]
     if isinstance(value, list) and value:
-        return np.array(entry.quantities(unit))
+        return np.array(entry.check(Listed(unit)))
     is_angle = unit == "rad"
     if not isinstance(value, dict):
         like = '"1.5 m", a list of such, { from, to, steps }'
@@ -405,7 +403,7 @@ def _read_commanded(entry: Entry, unit: str) -> float | Array | Sweep | FromLimi
     if is_angle and value.keys() & {"limit", "offset"}:
         return entry.described(FromLimit)  # type: ignore[no-any-return]
     entry.table(("from", "to", "steps"))
-    start, stop = (entry[end].quantity(unit) for end in ("from", "to"))
+    start, stop = (entry[end].check(Declared(unit)) for end in ("from", "to"))
     steps = DEFAULT_STEPS
     if "steps" in value:
         steps = entry["steps"].check(STEPS)
@@ -447,7 +445,7 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
             form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
             raise tolerance.refuse(f"must be like {form}")
         width = tolerance.holding(stated[0] if sigma else stated)
-        size = width.quantity(unit, POSITIVE)
+        size = width.check(Declared(unit, POSITIVE))
         if size <= 0.0:
             raise width.refuse("must be > 0")
         read = Tolerance(key, size, sigma)

@@ -471,7 +471,7 @@ lengths = { ground = "50 in", input = "2 in", coupler = "4 in", output = "4.5 in
 of the other three, 10.5 in
 lengths = { ground = "50 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
 ---
-with a unit, like "1 in"
+it is written like "1 in"
 lengths = { ground = "5 in", input = 2, coupler = "4 in", output = "4.5 in" }
 ---
 like "1 lb"

@@ -156,6 +156,10 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
     assert scene.motion.stroke == approx(hypot(0.09, 0.11), rel=4 * EPS)
     assert here.A[0] == approx([0.0, 0.1], abs=1e-14)
     assert here.B[0] == approx([0.175, 0.05], abs=1e-13)
+    assert loads(DRAWN + CYLINDER.replace('side = "drawn"\n', "")) == scene
+    for side in ("left", "right"):
+        stated = CYLINDER.replace('side = "drawn"', f'side = "{side}"')
+        assert loads(DRAWN + stated).motion.side == side
 
 
 @pytest.mark.parametrize(

@@ -71,6 +71,7 @@ omega_2 | omega2 | motion.omega2 | must be among omega_2,
 omega_2 = | omega = | must be among omega_2,
 theta_2 = | angle = | motion.angle | theta_2
 from_pin = | pin = | must be among from_pin,
+mass = | length = | bars.input.length | must be among mass
 mass = | cg = | bars.input.cg | mass, inertia, centre
 mass = | damping = | a damper between two points is in MuJoCo
 mass = | radius_of_gyration = | write inertia = m k^2, or m (k^2 - r^2)
@@ -78,18 +79,19 @@ mass = | radius_of_gyration = | write inertia = m k^2, or m (k^2 - r^2)
 gravity | gravitiy | effects.gravitiy | must be among gravity,
 { O2 = | { O3 = | effects.viscous.O3 | O2, A, B, O4
 "0.1 m" | "48 kg" | lengths.input | 48 kg | does not convert to m
-"3 N" | "3 kg" | loads[0].force[0] | 3 kg | N
+"3 N" | "3 kg" | loads[0].force | 3 kg | N
 "10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | "Hz" is not known
 "0.01 N m s/rad" | "0.01 N m s" | effects.viscous.O2 | N m s/rad
 "0.1 m" | 9 in | at line 4, column | in quotes, like "9 in"
-"0.1 m" | 0.1 | lengths.input | 0.1 | with a unit
+"0.1 m" | 0.1 | lengths.input | 0.1 | the unit is missing | like "1 m"
 "0.1 m" | "nan m" | lengths.input | nan m | finite
-"0.1 m" | nan | lengths.input | nan | finite
+"0.1 m" | nan | lengths.input | nan | the unit is missing
+"0.1 m" | [] | lengths.input | a finite number > 0, like "1 m"
 "0.1 m" | "1e999 m" | lengths.input | 1e999 m | too large
 "0.1 m" | "-0.1 m" | lengths.input | -0.1 m | > 0
 "0.1 m" | "1e-400 m" | lengths.input | > 0
 "0.2 kg" | "-1 kg" | bars.input.mass | -1 kg | >= 0
-mass = "0.2 kg" | density = "7850 kg/m^3" | bars.input.density = '7850 kg/m
+mass = "0.2 kg" | density = "7850 kg/m^3" | bars.input.density = 7850 kg/m^3: needs
 output = "0.22 m"\n |  | lengths.output | missing
 "0.1 m" | "10 m" | lengths | never close
 "open" | "opne" | motion.branch | opne | must be "open" or "crossed"
@@ -98,10 +100,13 @@ output = "0.22 m"\n |  | lengths.output | missing
 force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
 ["3 N", "40 deg"] | "3 N" | loads[0].force | pair
 ["3 N", "40 deg"] | { x = "1 N" } | loads[0].force.y | is missing
-["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force[1] | no finite number
+["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force | no finite number | "1 rad"
+["3 N", "40 deg"] | ["3 N", 40] | loads[0].force = 40 | the unit is missing | "1 rad"
+["3 N", "40 deg"] | { x = "1e308 N", y = "1.5e308 N" } | loads[0].force = inf | finite
 force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | moment
 "60 deg" | "60" | motion.theta_2 | the unit is missing
-"60 deg" | "drawn" | motion.theta_2 | the scene has no [pins]
+"60 deg" | "drawn" | motion.theta_2 = 'drawn' | like "1 rad"
+"60 deg" | ["1 deg", 2] | motion.theta_2 = 2 | like "1 rad"
 "60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known
 [[loads]] | [loads] | loads | [[loads]]
 "60 deg" | "0 deg to 360 deg" | motion.theta_2 | steps = 360 }
@@ -119,6 +124,10 @@ force = ["3 N", "40 deg"]\nfrom_pin | moment = "1 N m"\narm | .arm | needs a for
 ["9.81 m/s^2", "-90 deg"] | "9.81 m/s^2" | like gravity = ["9.81 m/s^2", "-90 deg"]
 """)
 """What is replaced, by what, and words that the line must hold."""
+HEAVY = """
+lengths = { ground = "30 m", input = "10 m", coupler = "25 m", output = "22 m" }
+bars.input.mass = "1e308 kg"
+"""
 LENGTHS = GOOD[GOOD.index("[lengths]") : GOOD.index("[bars")]
 ACROSS_LINES = [
     ("viscous =", SPRINGS.format("-0.1 m", 4), "effects.springs[1].length", ">= 0"),
@@ -133,6 +142,7 @@ ACROSS_LINES = [
     ),
     (LENGTHS, "", "lengths.ground", "missing"),
     (LENGTHS, "lengths = 3\n", "lengths", "table"),
+    (GOOD, HEAVY, "bars.input.mass", "a finite number"),
     ('"good"', "0x" + "f" * 5000, "title", "huge whole number"),
     ('"good"', "1" * 5000, "TOML"),
     ('"good"', "[" * 20000, "TOML", "deep"),

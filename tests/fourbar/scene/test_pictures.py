@@ -148,7 +148,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
     "stated, words",
     read_rows(r"""
 file = "../photo.jpg" | picture.file .*next to the scene file
-file = "photo.jpg"\nscale = "0 mm" | picture.scale .*> 0 with a unit
+file = "photo.jpg"\nscale = "0 mm" | picture.scale .*> 0, like
 file = "photo.jpg"\nscale = "2 kg" | picture.scale
 file = "photo.jpg"\norigin = [1] | picture.origin .*pair like \[1, 1\]
 file = "photo.jpg"\nopacity = 1.5 | picture.opacity .*0 to 1

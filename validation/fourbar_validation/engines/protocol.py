@@ -64,18 +64,8 @@ _OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 class _NumberEntry(Entry):
     """An entry with numbers in SI and radians in place of texts with units."""
 
-    QUANTITY = "in {}"
-    QUANTITIES = "[1.0, 2.0], in {}"
-    POLAR = "[1.0, 0.0], in {} and rad"
-    COORDINATES = ""
-
-    def in_si(self, unit: str, wanted: str) -> float:
-        value = self.value
-        if type(value) is int and value.bit_length() < 1024:
-            return float(value)
-        if type(value) is not float or not math.isfinite(value):
-            raise self.refuse(wanted)
-        return value
+    UNSTATED = (str,)
+    FORM = "must be a number, in {}"
 
 
 def scene_to_json(scene: Scene) -> dict[str, Any]:
