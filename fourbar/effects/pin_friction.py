@@ -6,10 +6,10 @@ fulfil
     x_p = k_p |F_p + sum over q of C_pq x_q|.
 
 With K_pq = k_p |C_pq| the right-hand side is a contraction in a weighted maximum norm
-where the spectral radius of K is below 1 (Perron): exactly one solution. For one pin
-the squared equation is a quadratic, and decides at any K. For several pins beyond that
+where the spectral radius of K is below 1 (Perron): exactly one solution. Beyond that
 radius solutions are searched for from many starts: what is not found there is taken not
-to exist.
+to exist. For one pin the right-hand side is convex, and Newton's steps find the least
+solution from 0 and the other one from far away.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, PinRows, SolvedFriction
-from fourbar.formulas.arithmetic import cross, dot, is_any, make_like
+from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
@@ -38,14 +38,16 @@ SOLVED = 1e-9
 """Gap of a solution, relative; the iteration converges to rounding or not at all."""
 SAME_SOLUTION = 1e-6
 """Two solutions found by the search are the same if they differ by less, relative."""
+FARTHEST = 1e12
+"""Largest couple that is looked at, over the size of the couples without friction."""
 MAGNITUDES = np.logspace(-2.0, 3.0, 6)
 """Sizes of the starts of a search, over the size of the couples without friction."""
 RANDOM_DIRECTIONS = 24
 """Directions of starts besides the axes and their middle. With 386 starts in all in
 place of 168 a search of 1100 random problems found no solution more.
 """
-SEARCHED_AT_ONCE = 64
-"""Problems that are searched at a time: each has all its starts in memory."""
+STARTS_AT_ONCE = 10_000
+"""Starts that are followed at a time: each problem has all its own in memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +213,7 @@ class _Problems(NamedTuple):
 
     def follow_newton(self, x: Array) -> Array:
         """Take Newton's steps from starts, (n, p), each until it stands still."""
-        most = 1e12 * self.size()[:, None]
+        most = FARTHEST * self.size()[:, None]
         moving = np.arange(len(x))
         for _ in range(NEWTON_STEPS):
             last = x[moving]
@@ -242,14 +244,25 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
 
     F (n, p), complex, is in N, C (n, p, p), complex, in 1/m, k (n, p) in m.
     """
-    finite = np.asarray(np.isfinite(F).all(axis=1) & np.isfinite(C).all(axis=(1, 2)))
     problems = _Problems(F, C, k)
+    p = k.shape[1]
+    x = np.full(k.shape, np.nan)
+    number = np.full(len(k), ONE_SOLUTION, dtype=np.uint8)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        if k.shape[1] == 1:
-            x, number = _solve_quadratic(F[:, 0], C[:, 0, 0], k[:, 0])
-        else:
-            x, number = _solve_coupled(problems, finite)
-        number[~finite] = ONE_SOLUTION
+        K = k[:, :, None] * np.abs(C)
+        finite = np.isfinite(F).all(axis=1) & np.isfinite(K).all(axis=(1, 2))
+        rows = np.flatnonzero(finite)
+        radius = np.abs(np.linalg.eigvals(K[rows])).max(axis=1)
+        contract = rows[radius < 1.0]
+        x[contract], number[contract] = _search(
+            problems.part(contract), np.zeros((1, p))
+        )
+        searched = np.setdiff1d(rows, contract[number[contract] == ONE_SOLUTION])
+        starts = _list_starts(p)
+        for block in np.array_split(
+            searched, 1 + searched.size * len(starts) // STARTS_AT_ONCE
+        ):
+            x[block], number[block] = _search(problems.part(block), starts)
         _, slope = problems.right_side(x)
     return _Sliding(x, number, slope)
 
@@ -267,63 +280,18 @@ def find_least_stretch(slope: Array) -> Array:
     return least
 
 
-def _solve_coupled(
-    problems: _Problems, finite: NDArray[np.bool_]
-) -> tuple[Array, NDArray[np.uint8]]:
-    """Solve problems of several pins: the least solution, and how many there are."""
-    k = problems.k
-    x = np.full(k.shape, np.nan)
-    number = np.full(len(k), ONE_SOLUTION, dtype=np.uint8)
-    K = k[:, :, None] * np.abs(problems.C)
-    rows = np.flatnonzero(finite & np.isfinite(K).all(axis=(1, 2)))
-    radius = np.abs(np.linalg.eigvals(K[rows])).max(axis=1)
+def _search(problems: _Problems, starts: Array) -> tuple[Array, NDArray[np.uint8]]:
+    """Find the least solution of each problem, and how many there are.
 
-    contract = rows[radius < 1.0]
-    contractions = problems.part(contract)
-    x[contract] = contractions.follow_newton(np.zeros_like(contractions.k))
-    solved = contract[contractions.are_solved(x[contract])]
-    searched = np.setdiff1d(rows, solved)
-    for start in range(0, len(searched), SEARCHED_AT_ONCE):
-        block = searched[start : start + SEARCHED_AT_ONCE]
-        x[block], number[block] = _search(problems.part(block))
-    return x, number
-
-
-def _solve_quadratic(F: Array, C: Array, k: Array) -> tuple[Array, NDArray[np.uint8]]:
-    """Solve (k^2 |C|^2 - 1) x^2 + 2 k^2 F.C x + k^2 |F|^2 = 0."""
-    kC = k * np.abs(C)
-    k2 = k * k
-    a = (kC - 1.0) * (kC + 1.0)
-    b = k2 * dot(F, C)
-    c = k2 * dot(F, F)
-    # b^2 - a c written as k^2 |F|^2 - k^4 (F x C)^2, which cancels only near jamming
-    across = k2 * cross(F, C)
-    discriminant = c - across * across
-    root = np.sqrt(discriminant)
-    q = -(b + np.where(b < 0.0, -root, root))
-    first = np.where(a == 0.0, np.inf, q / a)
-    second = np.where(q == 0.0, 0.0, c / q)
-    low = np.fmin(first, second)
-    high = np.fmax(first, second)
-    x = np.where(a < 0.0, high, low)
-
-    number = np.full(len(x), ONE_SOLUTION, dtype=np.uint8)
-    without_root = (discriminant < 0.0) | (b >= 0.0)
-    number[~(a < 0.0) & without_root & (c > 0.0)] = NO_SOLUTION
-    number[(a > 0.0) & (discriminant > 0.0) & (b < 0.0)] = MANY
-    x = np.where(c == 0.0, 0.0, x)
-    x[number == NO_SOLUTION] = np.nan
-    return x[:, None], number
-
-
-def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
-    """Find the least solution of each problem from many starts, and how many it has."""
+    `starts`: (s, p), over the size of the couples.
+    """
     n, p = problems.k.shape
-    starts = problems.size()[:, None, None] * _list_starts(p)
-    at_starts = problems.part(np.repeat(np.arange(n), starts.shape[1]))
-    ends = at_starts.follow_newton(starts.reshape(-1, p))
-    solves = at_starts.are_solved(ends).reshape(n, -1)
-    x = ends.reshape(starts.shape)
+    s = len(starts)
+    at_starts = problems.part(np.repeat(np.arange(n), s))
+    scaled = problems.size()[:, None, None] * starts
+    ends = at_starts.follow_newton(scaled.reshape(n * s, p))
+    solves = at_starts.are_solved(ends).reshape(n, s)
+    x = ends.reshape(n, s, p)
     sums = np.where(solves, x.sum(axis=2), np.inf)
     # some starts have not settled where solutions meet
     least = problems.follow_newton(x[np.arange(n), np.argmin(sums, axis=1)])
@@ -340,6 +308,8 @@ def _search(problems: _Problems) -> tuple[Array, NDArray[np.uint8]]:
 
 def _list_starts(p: int) -> Array:
     """List the starts of a search in p unknowns, over the size of the couples."""
+    if p == 1:
+        return np.array([[0.0], [FARTHEST]])
     generator = np.random.default_rng(0)
     random = generator.uniform(0.0, 1.0, (RANDOM_DIRECTIONS, p))
     directions = np.vstack([np.ones(p), np.eye(p) + 0.01, random])
