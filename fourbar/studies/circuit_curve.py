@@ -61,15 +61,9 @@ class RestPosition(NamedTuple):
 
 
 class _Sizes(Actions):
-    """Sums of the absolute terms of Q, each with the speed of the fastest bar.
+    """Sums of the absolute terms of Q, for bars that all turn by 1 rad."""
 
-    A bar at rest has rounding alone.
-    """
-
-    def __init__(self, state: State, bodies: Any) -> None:
-        super().__init__(state, bodies)
-        self.size: Any = 0.0
-        self.fastest = np.max(np.abs(state.k[:3]), axis=0)
+    size: Any = 0.0
 
     def force(
         self,
@@ -80,13 +74,13 @@ class _Sizes(Actions):
     ) -> None:
         super().force(bar, force, point, beyond)
         if bar == 3:
-            self.size = self.size + np.abs(force) * self.state.lengths.a * self.fastest
+            self.size = self.size + np.abs(force) * self.state.lengths.a
 
     def moment_about_pin(self, bar: int, moment: Any) -> None:
-        self.size = self.size + np.abs(moment) * self.fastest
+        self.size = self.size + np.abs(moment)
 
     def pin_couple(self, pin: str, couple: Any) -> None:
-        self.size = self.size + np.abs(couple) * self.fastest
+        self.size = self.size + np.abs(couple)
 
 
 def of_input(scene: Scene) -> Command:
@@ -267,9 +261,14 @@ class CircuitCurve:
         return np.broadcast_to(np.ravel(take_slopes(Q)), len(points))
 
     def size(self, points: Array) -> Array:
-        """Return the sum of the absolute terms of Q."""
-        actions = _Sizes(self.state(points), self.case.bodies).add(self.case.terms)
-        return np.broadcast_to(actions.size, len(points))
+        """Return the sum of the absolute terms of Q, each by the fastest bar's speed.
+
+        A bar at rest has rounding alone.
+        """
+        state = self.state(points)
+        actions = _Sizes(state, self.case.bodies).add(self.case.terms)
+        fastest = np.max(np.abs(state.k[:3]), axis=0)
+        return np.asarray(fastest * actions.size)
 
     def level(self, points: Array) -> NDArray[np.bool_]:
         """Mark points where Q is zero within round-off."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import ANGLES, Array
 from fourbar.scene import Command, Scene, command, command_at
-from fourbar.scene.motion import Sweep
+from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -47,6 +47,12 @@ def list_stretches(
     return list(zip(all_ends[::2], all_ends[1::2], strict=True))
 
 
+def states_single_positions(motion: Motion) -> bool:
+    """Return True for a motion of angles or strokes with nothing between them."""
+    moves = motion.law is not None or motion.free is not None
+    return not moves and not isinstance(motion.angle, Sweep | None)
+
+
 def follow(scene: Scene, solution: Solution) -> None:
     """Turn angles that follow, in place, to where the motion of the scene has them.
 
@@ -54,9 +60,7 @@ def follow(scene: Scene, solution: Solution) -> None:
     continuous from there, whichever positions of it are solved. Single positions have
     no motion.
     """
-    motion = scene.motion
-    moves = motion.law is not None or motion.free is not None
-    if not moves and not isinstance(motion.angle, Sweep | None):
+    if states_single_positions(scene.motion):
         return
     course = MotionCourse(scene, "position")
     order = np.argsort(course.places)
@@ -133,8 +137,7 @@ class MotionCourse:
             stated = self.released.at.places
         else:
             stated = command(self.scene).places
-        over_time = motion.free is not None or motion.law is not None
-        if not over_time and not isinstance(motion.angle, Sweep | None):
+        if states_single_positions(motion):
             first = float(command(self.scene).angle[0])
             stated = default_places(self.scene, first)
         steps = len(stated) - 1

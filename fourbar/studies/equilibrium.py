@@ -45,7 +45,7 @@ from fourbar.studies.circuit_curve import (
     RestPosition,
     transmission_angle,
 )
-from fourbar.studies.course import bisect
+from fourbar.studies.course import bisect, list_stretches
 
 _A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
@@ -62,7 +62,7 @@ An angle of the input has 16 digits, and bars 3 and 4 lose what this sine is sma
 SINE_AT_A_LIMIT = 2.0**-26
 """Sine between bars 3 and 4 that a rounded angle of the input leaves at a limit."""
 _A_RANGE = 3
-"""Samples in a row where Q is nothing: fewer may be a zero that falls on one."""
+"""Steps of the grid over which Q is nothing: fewer may be a zero that falls on one."""
 _AT_CHANGE_POINT = 1e-4
 """rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 
@@ -155,14 +155,14 @@ def equilibrium(scene: Scene) -> Equilibria:
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
         curve = CircuitCurve(scene)
-        level = _list_ranges(curve, curve.level, _A_RANGE + 1)
+        level = _list_ranges(curve, curve.level, _A_RANGE)
         samples = curve.samples()
         places, sizes = _find_zeros(curve, samples)
         order = curve.order(places)
         order = order[~_mark_wound(curve, places[order])]
         held: list[_CircuitRange] = []
         if any(term.dry_pins for term in curve.case.terms):
-            held = _list_ranges(curve, partial(_holds, curve), 1, places[order])
+            held = _list_ranges(curve, partial(_holds, curve), 0, places[order])
         found = []
         for place, size in zip(places[order], sizes[order], strict=True):
             found.append(_describe_equilibrium(curve, place, float(size), held))
@@ -201,8 +201,9 @@ def _is_wound(curve: CircuitCurve, theta_2: Array) -> NDArray[np.bool_]:
     """
     branch = np.full(theta_2.shape, curve.at.branch[0], dtype=np.int8)
     state = curve.case.at(Command(theta_2, branch, 0.0, 0.0))
-    springs = [term for term in curve.case.terms if term.counts_turns]
-    codes = np.array([spring.status(state, branch) for spring in springs])
+    codes = np.array(
+        [term.status(state, branch) for term in curve.case.terms if term.counts_turns]
+    )
     return np.asarray((codes == WOUND).any(axis=0))
 
 
@@ -434,7 +435,7 @@ def _list_ranges(
 
     Parameters
     ----------
-    least : samples in a row that are a range.
+    least : steps of the grid over which it holds at least.
     known : places at which the condition holds, besides those of the grid.
     """
 
@@ -447,31 +448,30 @@ def _list_ranges(
     tau = np.append(curve.grid, known)
     inside = there(tau)
     inside[len(curve.grid) :] = True
-    order = np.argsort(tau)
-    tau = tau[order]
-    inside = inside[order]
     if inside.all():
         first = last = curve.place(curve.points(np.zeros(1))[0])
         if curve.full:
             last = first._replace(theta_2=first.theta_2 + curve.period)
         return [_CircuitRange((first, last), 0.0, curve.period, True)]
     # once round, from a place outside
-    begin = int(np.argmin(inside))
-    tau = np.concatenate([tau[begin:], tau[: begin + 1] + curve.period])
-    inside = np.concatenate([inside[begin:], inside[: begin + 1]])
-    starts = np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
-    stops = np.flatnonzero(inside[:-1] & ~inside[1:])
-    is_range = stops - starts + 1 >= least
-    starts = starts[is_range]
-    stops = stops[is_range]
-    lows, _ = bisect(there, tau[starts], tau[starts - 1])
-    highs, _ = bisect(there, tau[stops], tau[stops + 1])
+    begin = tau[np.argmin(inside)]
+    tau = np.append(begin + np.remainder(tau - begin, curve.period), begin)
+    tau[-1] += curve.period
+    inside = np.append(inside, False)
+    order = np.argsort(tau)
+    tau = tau[order]
+
+    def locate(rows: NDArray[np.intp], ends: Array) -> Array:
+        beyond = np.where(ends == tau[rows], tau[rows + 1], tau[rows])
+        return bisect(there, ends, beyond)[0]
+
     ranges = []
-    for low, high in zip(lows, highs, strict=True):
-        places = low + np.array([0.0, 0.5, 1.0]) * (high - low)
-        points = curve.points(places)
-        one = curve.place(points[0])
-        stop = curve.place(points[2])
+    for low, high in list_stretches(inside[order], tau, locate):
+        assert low is not None and high is not None
+        if high - low < least * curve.period / curve.positions:
+            continue
+        places = np.array([low, 0.5 * (low + high), high])
+        one, _, stop = map(curve.place, curve.points(places))
         if curve.full and stop.theta_2 < one.theta_2:
             stop = stop._replace(theta_2=stop.theta_2 + curve.period)
         ends = (one, stop)

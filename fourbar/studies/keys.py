@@ -31,7 +31,6 @@ from fourbar.linkage import (
     PINS,
     Bar,
     Entries,
-    FourBar,
     copy_with,
     is_within,
     list_declared,
@@ -42,8 +41,6 @@ from fourbar.scene.numbers import Tolerance
 
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
-_BY_MATERIAL = ("density", "section", "diameter", "mass_per_length")
-"""Numbers of a bar that are varied only where the scene states them."""
 _MASS_CENTRE = "centre"
 OF_A_UNIFORM_BAR = ("inertia", _MASS_CENTRE)
 """Numbers of a bar that are those of a uniform one if they are left out."""
@@ -106,7 +103,7 @@ def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
 
 
 def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, SceneNumber]:
-    """List the entries of the numbers that a description, or its class, states.
+    """List the entries of the numbers that a description states.
 
     Those of a pair are listed one by one, and those of each pin by its name.
     """
@@ -119,7 +116,8 @@ def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, Scene
                 entries[of_pin] = SceneNumber(place, by.unit, by.bound)
         return entries
     for name, by in described.numbers.items():
-        if not isinstance(described, type) and getattr(described, name) is None:
+        is_left = isinstance(described, Bar) and name in OF_A_UNIFORM_BAR
+        if getattr(described, name) is None and not is_left:
             continue
         stated = f"{key}.{by.key or name}"
         place = (*path, name)
@@ -129,20 +127,6 @@ def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, Scene
         else:
             entries[stated] = SceneNumber(place, by.unit, by.bound)
     return entries
-
-
-def _list_bar(bar: Bar, name: str) -> dict[str, SceneNumber]:
-    """List the entries of a moving bar as it is stated.
-
-    A bar whose mass follows from its length has no entry for it.
-    """
-    absent = {number for number in _BY_MATERIAL if getattr(bar, number) is None}
-    if not absent >= {"density", "mass_per_length"}:
-        absent.add("mass")
-    entries = _list_entries(f"bars.{name}", ("linkage", name), Bar)
-    stated = [item for item in entries.items() if item[1].place[2] not in absent]
-    # what a uniform bar has follows from the numbers before it
-    return dict(sorted(stated, key=lambda item: item[1].place[2] in OF_A_UNIFORM_BAR))
 
 
 def _list_drawn_places(
@@ -179,13 +163,20 @@ def list_entries(scene: Scene) -> dict[str, SceneNumber]:
     Coordinates of drawn pins come first, then lengths, those of other drawn places
     last. What is commanded is not among them.
     """
-    of_ground = _list_entries("lengths", ("linkage",), FourBar)
+    of_ground = _list_entries("lengths", ("linkage",), scene.linkage)
     lengths = {"lengths.ground": of_ground["lengths.ground"]}
     bars = dict[str, SceneNumber]()
     for bar in MOVING_BARS:
         name = BAR_NAMES[bar]
-        bars |= _list_bar(scene.linkage.bar(bar), name)
-        lengths[f"lengths.{name}"] = bars.pop(f"bars.{name}.length")
+        described = scene.linkage.bar(bar)
+        of_bar = _list_entries(f"bars.{name}", ("linkage", name), described)
+        lengths[f"lengths.{name}"] = of_bar.pop(f"bars.{name}.length")
+        if described.density is not None or described.mass_per_length is not None:
+            del of_bar[f"bars.{name}.mass"]  # it follows from the length
+        # what a uniform bar has follows from the numbers before it
+        bars |= sorted(
+            of_bar.items(), key=lambda one: one[1].place[2] in OF_A_UNIFORM_BAR
+        )
     entries = lengths | of_ground | bars
     motion = scene.motion
     if motion.law is None:
@@ -223,18 +214,20 @@ def find_overlap(keys: Collection[str]) -> tuple[str, str] | None:
     A length follows from the pins of its bar, distance and angle of a place from the
     coordinates of the place. None: the keys state no number twice.
     """
-    ends = {f"lengths.{BAR_NAMES[bar]}": pins for bar, pins in ENDS.items()}
-    ends["lengths.ground_angle"] = ENDS[1]
-    for length, (first, second) in ends.items():
-        for key in keys:
-            if length in keys and key.startswith((f"pins.{first}.", f"pins.{second}.")):
-                return length, key
+    follows: dict[str, tuple[str, ...]] = {
+        f"lengths.{BAR_NAMES[bar]}": tuple(f"pins.{pin}." for pin in pins)
+        for bar, pins in ENDS.items()
+    }
+    follows["lengths.ground_angle"] = follows["lengths.ground"]
     for key in keys:
         stem, drawn, _ = key.partition(f".{DRAWN_WORD}.")
         form = stem if stem.endswith(_MASS_CENTRE) else f"{stem}.from_pin"
-        for followed in (f"{form}.0", f"{form}.1"):
-            if drawn and followed in keys:
-                return followed, key
+        if drawn:
+            follows |= dict.fromkeys((f"{form}.0", f"{form}.1"), (stem + drawn,))
+    for number, coordinates in follows.items():
+        for key in keys:
+            if number in keys and key.startswith(coordinates):
+                return number, key
     return None
 
 

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import Array
-from fourbar.scene.motion import Sweep
 from fourbar.solution import Solution, shift_to_drawing
-from fourbar.studies.course import MotionCourse
+from fourbar.studies.course import MotionCourse, states_single_positions
 
 ROUNDS = 3
 """Rounds in which the steps beside an extreme are divided."""
@@ -52,9 +51,7 @@ def measure_paths(solution: Solution) -> dict[str, Path]:
     Nothing is measured of a scene that states single positions.
     """
     scene = solution.scene
-    motion = scene.motion
-    moves = motion.law is not None or motion.free is not None
-    if not scene.points or not (moves or isinstance(motion.angle, Sweep | None)):
+    if not scene.points or states_single_positions(scene.motion):
         return {}
     course = MotionCourse(scene, "position", solution)
     if not course.solution.assembled.any():
