@@ -181,13 +181,7 @@ def test_a_step_of_refinement_leaves_the_residual_of_a_rounding():
     """Bars almost in line: the determinant has lost nine digits."""
     jacobian = np.array([[0.3, 1.0, -1.0], [0.2, 0.7, -0.7 + 1e-9]])
     turn = np.array([0.0, 1.0, 0.5])
-    rates = solve_closed(
-        jacobian,
-        2.0,
-        turn,
-        0.3,
-        -0.4,
-    )
+    rates = solve_closed(jacobian, 2.0, turn, (0.3, -0.4))
     terms = np.abs(jacobian) @ np.abs(rates)
     assert np.all(np.abs(jacobian @ rates + [0.3, -0.4]) <= 4.0 * EPS * terms)
     multipliers = np.array(solve_multipliers(jacobian, turn, [0.3, -0.4, 0.7]))

@@ -59,28 +59,29 @@ class PinocchioTree(Tree):
             for name, place in part.points.items():
                 frame = pin.Frame(name, joint, 0, _shift(place), pin.FrameType.OP_FRAME)
                 self.frame[name] = model.addFrame(frame, False)
-        self.data = model.createData()
+        self.data = data = model.createData()
         self.q = np.zeros(3)
         self.external = pin.StdVec_Force([pin.Force.Zero()] * model.njoints)
+        # the engine's own memory, read and written in place: to look it up again costs
+        # more than a pass of the engine
+        self.at = {
+            name: data.oMf[frame].translation[:2] for name, frame in self.frame.items()
+        }
+        self.turned_to = {
+            bar: data.oMi[joint].rotation[:2, :2] for bar, joint in self.joint.items()
+        }
+        self.joint_force = {
+            bar: data.f[self.joint[bar]].linear[:2] for bar in MOVING_BARS
+        }
+        self.model_gravity = model.gravity.linear
         self.ready(scene, list_wrenches(scene, self))
-        self._set_gravity(self.field)
-
-    def _set_gravity(self, field: Sequence[float]) -> None:
-        self.model.gravity.linear = np.array([*field, 0.0])
+        self.model_gravity[:2] = self.field
 
     def place(self, q: Sequence[float]) -> None:
         """Place joint frames, Jacobian columns and points at q."""
         self.q[:] = q
         pin.computeJointJacobians(self.model, self.data, self.q)
         pin.updateFramePlacements(self.model, self.data)
-
-    def point(self, name: str) -> Array:
-        """Return the origin of a frame."""
-        return np.asarray(self.data.oMf[self.frame[name]].translation[:2])
-
-    def rotation(self, bar: int) -> Array:
-        """Return the axes of the joint's frame."""
-        return np.asarray(self.data.oMi[self.joint[bar]].rotation[:2, :2])
 
     def point_jacobian(self, name: str) -> Array:
         """Return the Jacobian of a frame's origin, (2, 3)."""
@@ -120,7 +121,7 @@ class PinocchioTree(Tree):
 
         What acts on the bars are external forces.
         """
-        self._set_gravity(field)
+        self.model_gravity[:2] = field
         for bar, (x, y, moment) in wrenches.items():
             inside = complex(x, y) / self.rotate(bar, 1.0)
             force = [inside.real, inside.imag, 0.0, 0.0, 0.0, moment]
@@ -132,11 +133,10 @@ class PinocchioTree(Tree):
 
     def joint_forces(self) -> dict[int, complex]:
         """Read what each joint transmits, which the last pass left in its own axes."""
-        forces = {}
-        for bar in MOVING_BARS:
-            x, y, _ = self.data.f[self.joint[bar]].linear.tolist()
-            forces[bar] = self.rotate(bar, complex(x, y))
-        return forces
+        return {
+            bar: self.rotate(bar, complex(*force.tolist()))
+            for bar, force in self.joint_force.items()
+        }
 
 
 PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)

@@ -55,8 +55,7 @@ class PlainLoop:
                 raise LimitError("the loop does not close at every position")
             jacobian = tree.jacobian()
             v = solve_closed(jacobian, speed)
-            x, y = tree.drift(v)
-            a = solve_closed(jacobian, acceleration, x=x, y=y)
+            a = solve_closed(jacobian, acceleration, drift=tree.drift(v))
             tree.moving(v, a)
             x, y, torque[row] = solve_multipliers(jacobian, self.drive, tree.torques())
             forces["F43"][row] = x, y

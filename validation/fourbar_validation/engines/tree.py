@@ -34,10 +34,10 @@ from fourbar_validation.engines.loaded import (
 if TYPE_CHECKING:
     from fourbar.effects.place import Place
 
-Components3 = tuple[float, float, float]
 _OPEN_AT_B = [(name, point) for name, point in PART_POINTS.items() if name != "A2"]
 """Names of points where bars 2 and 3 share pin A, and of the points of the bars."""
 _ACCELERATIONS = [f"a_{name}" for name in ON_BARS]
+Components3 = tuple[float, float, float]
 NO_RATES = np.zeros(3)
 """Speeds or accelerations of the coordinates, where they are zero."""
 BEARERS = {2: (2,), 3: (3, 2), 4: (4,)}
@@ -65,6 +65,10 @@ class Tree(Loaded, Protocol):
     """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
     v: Array
     a: Array
+    at: Mapping[str, Array]
+    """Places of the points that `description.parts` names, m: the engine's memory."""
+    turned_to: Mapping[int, Array]
+    """Axes along and across each bar's line: the engine's memory."""
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
         """Prepare the evaluation.
@@ -108,6 +112,14 @@ class Tree(Loaded, Protocol):
 
         Motion and wrenches are those last asked for.
         """
+
+    def point(self, name: str) -> Array:
+        """Read a place."""
+        return self.at[name]
+
+    def rotation(self, bar: int) -> Array:
+        """Read a bar's axes."""
+        return self.turned_to[bar]
 
     # methods that follow from these
     def gap(self) -> tuple[float, float]:
@@ -191,7 +203,7 @@ class Tree(Loaded, Protocol):
         commanded = self.turns[bar]
         try:
             v = solve_closed(jacobian, speed, commanded)
-            a = solve_closed(jacobian, acceleration, commanded, *self.drift(v))
+            a = solve_closed(jacobian, acceleration, commanded, self.drift(v))
         except np.linalg.LinAlgError:
             return {}
         self.moving(v, a)
@@ -250,13 +262,13 @@ def solve_closed(
     jacobian: Array,
     rate: float,
     turn: Array = _BAR_2,
-    x: float = 0.0,
-    y: float = 0.0,
+    drift: Sequence[float] = (0.0, 0.0),
 ) -> Array:
-    """Solve J rates + (x, y) = 0, turn . rates = rate.
+    """Solve J rates + drift = 0, turn . rates = rate.
 
     The rates are those of the coordinates; LinAlgError at a toggle.
     """
+    x, y = drift
     rows = (*jacobian.tolist(), turn.tolist())
     return np.array(_solve_three(rows, (-x, -y, rate)))
 

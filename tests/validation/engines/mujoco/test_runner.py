@@ -121,10 +121,13 @@ def test_a_drive_that_does_not_follow_the_law_fails_the_run(factor, monkeypatch)
     """The engine is judged at the motion it made; its own speed says that it is not the
     law's.
     """
-    right = runner.RunCourse.alpha
-    monkeypatch.setattr(
-        runner.RunCourse, "alpha", lambda *arguments: factor * right(*arguments)
-    )
+    right = runner.RunCourse.accelerate
+
+    def accelerate(*arguments):
+        alpha = right(*arguments)
+        return lambda *state: factor * alpha(*state)
+
+    monkeypatch.setattr(runner.RunCourse, "accelerate", accelerate)
     failed = [row.reason for row in simulated(PERIODIC) if not row.passed]
     assert any("does not turn as commanded" in reason for reason in failed)
 

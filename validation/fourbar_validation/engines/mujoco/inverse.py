@@ -70,9 +70,14 @@ class MujocoTree(Tree):
         model.site_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         model.body_simple[:] = 0
         model.dof_simplenum[:] = 0
-        self.data = mujoco.MjData(model)
+        self.data = data = mujoco.MjData(model)
         self.body = {bar: model.body(f"bar{bar}").id for bar in MOVING_BARS}
         self.site = {model.site(number).name: number for number in range(model.nsite)}
+        # the engine's own memory, read in place: to look it up again takes longer than
+        # its work
+        self.at = {name: data.site_xpos[site, :2] for name, site in self.site.items()}
+        axes = data.xmat.reshape(-1, 3, 3)[:, :2, :2]
+        self.turned_to = {bar: axes[body] for bar, body in self.body.items()}
         self._jac = np.zeros((3, 3))
         self._acceleration = np.zeros(6)
         self.ready(scene, list_wrenches(scene, self))
@@ -82,16 +87,6 @@ class MujocoTree(Tree):
         self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
-
-    def point(self, name: str) -> Array:
-        """Return the place of a site."""
-        place: Array = self.data.site_xpos[self.site[name], :2]
-        return place
-
-    def rotation(self, bar: int) -> Array:
-        """Return the axes of the body."""
-        axes: Array = self.data.xmat[self.body[bar]].reshape(3, 3)[:2, :2]
-        return axes
 
     def point_jacobian(self, name: str) -> Array:
         """Return the Jacobian of a site."""
@@ -135,16 +130,16 @@ class MujocoTree(Tree):
         mujoco.mj_inverse(self.model, self.data)
         applied = np.zeros(3)
         for bar, (x, y, moment) in wrenches.items():
-            body = self.body[bar]
-            mujoco.mj_applyFT(
-                self.model,
-                self.data,
-                np.array([x, y, 0.0]),
-                np.array([0.0, 0.0, moment]),
-                self.data.xpos[body],
-                body,
-                applied,
-            )
+            if x or y or moment:
+                mujoco.mj_applyFT(
+                    self.model,
+                    self.data,
+                    np.array([x, y, 0.0]),
+                    np.array([0.0, 0.0, moment]),
+                    self.data.xpos[self.body[bar]],
+                    self.body[bar],
+                    applied,
+                )
         torques: list[float] = (self.data.qfrc_inverse - applied).tolist()
         return torques
 

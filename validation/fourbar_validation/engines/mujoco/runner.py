@@ -18,7 +18,6 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -33,7 +32,7 @@ from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
-from fourbar.scene.motion import Law, Motion
+from fourbar.scene.motion import Motion
 from fourbar_validation.engines.description import (
     find_from_middle,
     list_speeds,
@@ -125,8 +124,6 @@ class RunCourse:
         if scene.motion.law is not None and command.time is not None:
             self.law = law = scene.motion.law
             self.values = command.time
-            self.knots = np.array(law.time)
-            _, _, self.at_knots = law.at(self.knots)
             instants = np.linspace(law.time[0], law.time[-1], INSTANTS_OF_A_LAW)
             _, speeds, accelerations = np.abs(law.at(instants))
             self.speed = float(speeds.max())
@@ -174,27 +171,17 @@ class RunCourse:
         """Return the greatest speed of the input, rad/s; `fastest`: the commanded."""
         return fastest
 
-    def accelerate(self, began: float) -> ActuatorForce | None:
+    def accelerate(self, segment: Segment, timestep: float) -> ActuatorForce | None:
         """Return the input's acceleration at a state, None if the file states it.
 
-        Stages of a step at one time share what a law has there. `began`: time at which
-        the segment begins, s.
+        A law is evaluated once, at all stages of a segment's steps.
         """
         if self.law is None:
             return None
-        alpha = lru_cache(maxsize=4)(self.alpha)
-        return lambda _, data: alpha(began + data.time)
-
-    def alpha(self, instant: float) -> float:
-        """Return the law's angular acceleration at a time, rad/s^2.
-
-        A law of cubic pieces is linear between knots in acceleration, and is
-        interpolated; another law is evaluated.
-        """
-        if isinstance(self.law, Law) and self.law.omega is None:
-            return float(np.interp(instant, self.knots, self.at_knots))
-        _, _, alpha = self.law.at(np.array([instant]))
-        return float(alpha[0])
+        half = timestep / 2.0
+        stages = segment.began + np.arange(0.0, segment.duration + timestep, half)
+        _, _, alpha = self.law.at(np.minimum(stages, self.law.time[-1]))
+        return lambda _, data: float(alpha[round(data.time / half)])
 
     def least_sine(self, closes: NDArray[np.bool_]) -> float:
         """Return the least |sin(theta_4 - theta_3)| on the way."""
@@ -425,7 +412,7 @@ class Lead(RunCourse):
                 )
         return greatest
 
-    def accelerate(self, began: float) -> ActuatorForce | None:
+    def accelerate(self, segment: Segment, timestep: float) -> ActuatorForce | None:
         """Return what solves for the acceleration at MuJoCo's state."""
         return self.alpha_2
 
@@ -456,7 +443,7 @@ class Lead(RunCourse):
         drift = (loop.rate_at("B3") - loop.rate_at("B4")) @ data.qvel
         due = self.acceleration - loop.drive_drift(self.bar)
         column = loop.drive_column(self.bar)
-        accelerations = solve_closed(loop.jacobian(), due, column, *drift.tolist())
+        accelerations = solve_closed(loop.jacobian(), due, column, drift.tolist())
         return float(accelerations[O2])
 
     def least_sine(self, closes: NDArray[np.bool_]) -> float:

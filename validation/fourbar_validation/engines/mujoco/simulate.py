@@ -256,7 +256,8 @@ class _Simulation:
             turn = 2.0 * np.pi / motion_segment.turning
             self.steps_per_revolution = max(self.steps_per_revolution, turn / timestep)
         supplied = dict(self.supplied)
-        if (accelerate := self.course.accelerate(motion_segment.began)) is not None:
+        accelerate = self.course.accelerate(motion_segment, timestep)
+        if accelerate is not None:
             supplied["drive"] = lambda m, d: m.dof_armature[O2] * accelerate(m, d)
         settings = replace(self.settings, timestep=timestep, timestep_scale=1.0)
         with supply_forces(supplied):
