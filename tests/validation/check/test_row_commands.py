@@ -241,15 +241,6 @@ def follow_rise(time):
     return theta, omega, alpha, fourbar.solve(SERVO, at=at).torque
 
 
-@pytest.mark.parametrize("lag, side", [(2e-3, "before"), (-5e-3, "after")])
-def test_numbers_of_another_time_along_a_law_are_named(lag, side, read):
-    time = np.arange(0.0123, 0.79, 0.0517)
-    columns = time.round(4), follow_rise(time)[0], follow_rise(time - lag)[3]
-    judgement = Judgement(SERVO, read(write("time,theta_2,torque", *columns)))
-    (only,) = judgement.explanations
-    assert only.complete and f"time {abs(lag):g} s {side} its own" in only.text
-
-
 @pytest.mark.parametrize("names, refused", LOGGED)
 def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read):
     time = np.arange(0.0123, 0.79, 0.0517)

@@ -575,61 +575,14 @@ OTHER_SCENES = {
         with_effects(Torsion((("O2", 2.0, 1.0, 0.3),))),
         with_effects(Torsion((("O2", 2.6, 1.0, 0.3),))),
     ),
-    **{
-        f"{whose} acts at {where}": (
-            SCENE,
-            replace(
-                with_effects(),
-                loads=tuple(
-                    replace(weight, from_pin=(part * bar.length, 0.0))
-                    for weight, bar in zip(WEIGHTS, BARS.values(), strict=True)
-                ),
-            ),
-        )
-        # G of the other two is there
-        for whose, where, part in (
-            ("every weight", "its first pin", 0.0),
-            ("the weight of bar 3", "mid-bar", 0.5),
-        )
-    },
-    "the places of loads.0 and loads.1 are exchanged": (
-        replace(SCENE, loads=(PUSH, Load(2, (5.0, 1.4), from_pin=(0.02, 0.3)))),
-        replace(
-            SCENE,
-            loads=(
-                replace(PUSH, from_pin=(0.02, 0.3)),
-                Load(2, (5.0, 1.4), from_pin=PLACE),
-            ),
-        ),
-    ),
     "loads.0 (bar 4): its place is measured from the bar's second pin, not from its"
     " first": (
         replace(SCENE, loads=(PUSH,)),
         replace(SCENE, loads=(replace(PUSH, from_pin=FROM_B),)),
     ),
-    "dry friction is taken for viscous damping": (
-        with_effects(Friction((("O4", 0.3),))),
-        with_effects(Viscous((("O4", 0.3),))),
-    ),
-    "effects.torsion.O4.rest a turn larger": (
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.2)),
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.2 - 2.0 * math.pi)),
-    ),
-    "effects.torsion.*.rest a turn smaller": (
-        with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, 0.0)),
-        with_torsion((2.0, 0.4, 0.5 + 4.0 * math.pi), (1.0, 1.0, 2.0 * math.pi)),
-    ),
     "effects.springs.0.length 1.3 times ours (fitted)": (
         with_springs(DRAWN),
         with_springs(replace(DRAWN, length=0.13)),
-    ),
-    "the springs act both ways": (
-        with_springs(PULLING),
-        with_springs(SLACK),
-    ),
-    "the flywheel is on bar 4": (
-        with_effects(Flywheel(0.3)),
-        with_effects(Flywheel(0.3, 4)),
     ),
     "gravity is taken along -y": (
         with_effects(Gravity(angle=-1.2)),

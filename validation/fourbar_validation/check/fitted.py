@@ -1,6 +1,6 @@
 """Mistakes with a number in them, which is fitted to the table.
 
-The number is a ratio, a factor, an offset or another order.
+The number is a ratio, a factor or an offset.
 """
 
 import cmath
@@ -29,8 +29,8 @@ from fourbar_validation.check.variants import (
     solve_other,
     state_all,
 )
-from fourbar_validation.check.wrong_scenes import group_numbers, is_place
-from fourbar_validation.compare.tolerance import compute_difference, wrap_difference
+from fourbar_validation.check.wrong_scenes import DONE, group_numbers
+from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
 
@@ -79,22 +79,14 @@ is a sixth of the right one takes eight steps.
 """
 FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope, rad."""
-MOST_ROWS_REORDERED = 1000
-"""Rows among which another order is looked for. Every one is held against every other.
-"""
+_IN_VAIN = 0.9
+"""Part of a misfit that the slopes leave of it, above which a fit is given up."""
 
 
 def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """List every mistake whose number the table gives, the simplest first."""
     yield from _find_ratios(judge, differing)
     yield from _try_exchanged(judge, differing)
-    moved = all(
-        column in differing or not np.ptp(column.ours[column.where], axis=0).any()
-        for column in judge.columns.values()
-        if column.where.any()
-    )
-    if moved:  # another order or zero leaves nothing right that varies
-        yield from _try_order(judge)
     yield from _fit_problems(judge, differing)
 
 
@@ -218,42 +210,42 @@ class _Family(NamedTuple):
     start: tuple[float, ...]
     make: Callable[..., Mistake]
     """Function of the numbers that returns the mistake of a problem."""
+    of_ours: bool = True
+    """True if the first are those of the right problem."""
 
 
 def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
-    """Fit numbers of the scene, the command's speed, its zero and its times.
+    """Fit numbers of the scene, the command's speed and its zero.
 
     Each family is fitted by Gauss and Newton to the columns that differ.
     """
     columns = [column for column in differing if column.size.any()]
     if not columns:
         return
-    here = _compute_residual(columns, Mistake("", judge.right.__getitem__))
-    if np.count_nonzero(here) < ENOUGH_NUMBERS:
+    right = _compute_residual(columns, Mistake("", judge.right.__getitem__)).ravel()
+    if np.count_nonzero(right) < ENOUGH_NUMBERS:
         return
     scene = state_all(judge.scene)
     at = drop_remainder(judge.at)
-    families = [*_list_scenes(scene, at), *_list_commands(judge, scene, at, columns)]
-    for family in families:
-        fitted = _fit(columns, family)
+    for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
+        fitted = _fit(columns, family, right)
         if fitted is not None and np.abs(fitted).max() > LEAST_NUMBER:
             yield family.make(*fitted)._replace(times=CARRIED)
 
 
-def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
-    """Fit the numbers of a family; None if no others fit better than its first."""
+def _fit(columns: list[JudgedColumn], family: _Family, here: Array) -> Array | None:
+    """Fit the numbers of a family; None if no others fit better than its first.
+
+    `here`: residual at these, which is that of the right numbers if they are ours.
+    """
     numbers = np.array(family.start)
 
     def measure(numbers: Array) -> Array:
         return _compute_residual(columns, family.make(*numbers.tolist())).ravel()
 
-    least = math.inf
-    for step in range(NEWTON):
+    if not family.of_ours:
         here = measure(numbers)
-        size = float(np.sqrt(np.nansum(here * here)))
-        if not size < 0.5 * least:
-            return numbers if step > 1 else None
-        least = size
+    for step in range(NEWTON):
         slopes = []
         for shift in FIT_STEP * np.eye(len(numbers)):
             less, more = measure(numbers + shift), measure(numbers - shift)
@@ -262,18 +254,29 @@ def _fit(columns: list[JudgedColumn], family: _Family) -> Array | None:
             slopes.append(np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP))
         known = np.isfinite(here) & np.isfinite(slopes).all(axis=0)
         matrix = np.transpose(slopes)[known]
-        numbers = numbers - np.linalg.lstsq(matrix, here[known], rcond=None)[0]
+        change = np.linalg.lstsq(matrix, here[known], rcond=None)[0]
+        size = _find_size(here)
+        if step == 0 and _find_size(here[known] - matrix @ change) > _IN_VAIN * size:
+            return None
+        numbers = numbers - change
+        here = measure(numbers)
+        if not _find_size(here) < 0.5 * size:
+            return numbers if step > 0 else None
     return numbers
+
+
+def _find_size(residual: Array) -> float:
+    return float(np.sqrt(np.nansum(residual * residual)))
 
 
 def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
     """List numbers of a scene that may be others, as functions of a factor or value."""
-    groups = group_numbers(scene)
     fitted = {
-        name: own
-        for name, own in groups.items()
-        if name.endswith(".length") or not is_place(scene, own)
+        name: group
+        for name, group in group_numbers(scene, places=True).items()
+        if name.endswith(".length")
     }
+    fitted |= group_numbers(scene, places=False)
     lengths = {name: bar.length for name, bar in list_moving(scene)}
     lengths["ground"] = scene.linkage.ground
     for name, length in lengths.items():
@@ -301,6 +304,8 @@ def _scale(
 ) -> Mistake:
     numbers = {key: factor * value for key, value in group.items()}
     text = f"{name} {factor:.6g} times ours (fitted)"
+    if done := DONE.get(round(factor, 6)):
+        text = f"{name} {done}"
     return solve_other(text, replace_numbers(scene, numbers), at)
 
 
@@ -326,15 +331,12 @@ def _rub(
 
 
 def _list_commands(
-    judge: Judge, scene: Scene, at: Command, columns: list[JudgedColumn]
+    scene: Scene, at: Command, columns: list[JudgedColumn]
 ) -> Iterator[_Family]:
     """List commands that may be others, as functions of a number."""
     for field, rate in zip(("speed", "acceleration"), at.names[1:], strict=True):
         if np.any(getattr(at, field)):
             yield _Family((1.0,), partial(_hasten, scene, at, field, rate))
-    law, times = judge.scene.motion.law, judge.table.times
-    if law is not None and times is not None:
-        yield _Family((0.0,), partial(_delay, scene, at, law, times.values))
     if at.moves_stroke:
         return
     n = len(at.angle)
@@ -348,7 +350,7 @@ def _list_commands(
     misfits = shares.reshape(len(tried), -1).mean(axis=1)
     if misfits.min() < PROMISING:
         start = float(tried[np.argmin(misfits)])
-        yield _Family((start,), partial(_turn, scene, at))
+        yield _Family((start,), partial(_turn, scene, at), of_ours=False)
 
 
 def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
@@ -364,55 +366,3 @@ def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
 def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
     text = f"{rate} {factor:.6g} times ours (fitted)"
     return solve_other(text, scene, at._replace(**{field: factor * getattr(at, field)}))
-
-
-def _delay(scene: Scene, at: Command, law: Any, time: Array, lag: float) -> Mistake:
-    """Return the problem of the law at times that are earlier by a lag, s."""
-    side = "before" if lag > 0.0 else "after"
-    text = f"each row has the numbers of the time {abs(lag):.6g} s {side} its own"
-    earlier = np.clip(time - lag, law.time[0], law.time[-1])
-    angle, speed, acceleration = law.at(earlier)
-    moved = at._replace(angle=angle, speed=speed, acceleration=acceleration)
-    late = solve_other(f"{text} (fitted)", scene, moved)
-    return late.within(UNITS.keys() - {*at.names})
-
-
-def _try_order(judge: Judge) -> Iterator[Mistake]:
-    """Yield the right numbers in other rows: each row of theirs goes to our nearest."""
-    n = len(judge.at.angle)
-    columns = [
-        column
-        for column in judge.columns.values()
-        if column.where.all() and column.size.all()
-    ]
-    if not ENOUGH_NUMBERS <= n <= MOST_ROWS_REORDERED or not columns:
-        return
-    apart = np.zeros((n, n))
-    for column in columns:
-        theirs = np.repeat(column.theirs, n, axis=0)
-        ours = np.concatenate([column.ours] * n)
-        filled = np.where(np.isnan(theirs), ours, theirs)
-        difference = compute_difference(column.quantity, ours, filled)
-        apart += difference.reshape(n, n) / column.size.max()
-    nearest = np.argmin(apart, axis=1)
-    in_place = np.arange(n)
-    # a revolution ends where it began
-    several_alike = len(np.unique(nearest)) < n - 1
-    if several_alike or np.array_equal(nearest, in_place):
-        return
-    found_by = judge.table.found_by
-    shifts = np.remainder(nearest - in_place + n / 2, n) - n / 2
-    rows = round(float(np.median(shifts)))
-    text = f"the rows are in another order than their {found_by}"
-    if np.all(np.diff(nearest)[1:-1] == -1):
-        text = f"the rows are in reverse order: {found_by} runs the other direction"
-    elif np.count_nonzero(shifts == rows) >= n - 2:
-        text = f"each row has the numbers of the {found_by} {rows:+d} rows away"
-
-    def take(quantity: str) -> Array | None:
-        values = getattr(judge.right, quantity, None)
-        if values is None or quantity == judge.right.commanded:
-            return None
-        return np.asarray(values[nearest])
-
-    yield Mistake(text, take)

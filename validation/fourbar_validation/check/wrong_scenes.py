@@ -1,7 +1,7 @@
 """Scenes that somebody may have solved in place of the one that was set.
 
-A number of a scene, or all numbers under one name, may have another factor; a load may
-act elsewhere; a bar may have what belongs to another.
+A number of a scene, or all numbers under one name, may be left out or have another
+factor; inertia may count about another point; a load may act elsewhere.
 """
 
 import cmath
@@ -9,22 +9,11 @@ import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from fnmatch import filter as choose_names
-from itertools import combinations, permutations
 from typing import Any
 
-from fourbar.effects import (
-    Flywheel,
-    Friction,
-    Gravity,
-    Load,
-    Springs,
-    Torsion,
-    Viscous,
-)
+from fourbar.effects import Gravity, Load
 from fourbar.effects.load import PLACES_OF_LOADS
 from fourbar.errors import InputError
-from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NUMBERS, MOVING_BARS
 from fourbar.scene import Scene
 from fourbar.studies.keys import list_entries, read_number, replace_numbers
@@ -34,7 +23,7 @@ from fourbar_validation.scenes.bars import list_moving
 
 _PLACE_UNITS = ("m", "rad")
 """Units of numbers that say where and in which direction something acts."""
-_DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
+DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
 """Factors on numbers of a scene, and what was done to them."""
 _CENTIMETRES = "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm"
 _MILLIMETRES = "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm"
@@ -48,71 +37,59 @@ _INERTIAL = {
     f"inertial forces with the wrong sign {_D_ALEMBERT}": (-1.0, -1.0),
 }
 """Factors on m a and I alpha of every bar, by the mistake behind them."""
-_LAWS = {
-    "dry friction is taken for viscous damping": (Friction, Viscous),
-    "viscous damping is taken for dry friction": (Viscous, Friction),
-}
-"""Another law of the friction at pins: which is stated, and which is taken."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
 
 
-def group_numbers(scene: Scene) -> dict[str, Numbers]:
+def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
     """List the numbers of a scene that are not 0, one by one and under one name.
 
-    The name is a key, or the part of it that several have in common. Numbers of a place
-    are put together with those of the same name alone, and the others with all that
-    acts with them.
+    The name is a key, or the part of it that several have in common. Numbers that say
+    where something acts (`places`) are put together with those of the same name alone;
+    the others with all that acts with them.
     """
-    numbers: Numbers = {}
-    of_places = set()
+    groups: dict[str, Numbers] = {}
     for key, entry in list_entries(scene).items():
         acts = key.startswith(("bars.", "loads.", "effects."))
-        if acts and (value := read_number(scene, entry)):
-            numbers[key] = value
-            if entry.unit in _PLACE_UNITS:
-                of_places.add(key)
-    groups: dict[str, Numbers] = {}
-    for key in numbers:
+        value = read_number(scene, entry)
+        if not acts or not value or (entry.unit in _PLACE_UNITS) != places:
+            continue
         parts = key.split(".")
-        names = [".".join(parts[:end]) for end in range(len(parts), 0, -1)]
         which = 2 if parts[0] == "effects" else 1
+        shared = ".".join([*parts[:which], "*", *parts[which + 1 :]])
+        names = [key]
+        if not places:
+            names += [".".join(parts[:end]) for end in range(len(parts) - 1, 0, -1)]
         if which < len(parts) - 1:
-            names.append(".".join([*parts[:which], "*", *parts[which + 1 :]]))
+            names.append(shared)
         for name in names:
-            own = choose_names(numbers, name)
-            if key not in of_places:
-                own += choose_names(numbers.keys() - of_places, f"{name}.*")
-            group = {one: numbers[one] for one in numbers if one in own}
-            if group and group not in groups.values():
-                groups[name.removesuffix(".0")] = group
-    return groups
-
-
-def is_place(scene: Scene, group: Numbers) -> bool:
-    """Return whether the numbers of a group say where something acts."""
-    entries = list_entries(scene)
-    return any(entries[key].unit in _PLACE_UNITS for key in group)
+            groups.setdefault(name, {})[key] = value
+    unlike: dict[str, Numbers] = {}
+    for name, group in groups.items():
+        if group not in unlike.values():
+            unlike[name.removesuffix(".0")] = group
+    return unlike
 
 
 def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List scenes in place of one that states every number, by the mistake."""
-    groups = group_numbers(scene)
+    """List scenes in place of one that states every number, by the mistake.
+
+    Of numbers that are no places the fit of a factor finds what is not left out.
+    """
+    groups = group_numbers(scene, places=False)
     for name, group in groups.items():
-        for factor, done in _DONE.items():
-            other = {key: factor * value for key, value in group.items()}
-            yield f"{name} {done}", replace_numbers(scene, other)
+        yield f"{name} left out", replace_numbers(scene, dict.fromkeys(group, 0.0))
     if scene.loads and any(name.startswith("effects") for name in groups):
         bare = replace(scene, loads=(), effects=())
         yield "loads and effects left out: inertia alone", bare
     for text, numbers in (*_list_wrong_numbers(scene), *_list_wrong_bars(scene)):
         yield text, replace_numbers(scene, numbers)
-    for text, loads in (*_list_wrong_loads(scene), *_list_wrong_weights(scene)):
+    for name, group in group_numbers(scene, places=True).items():
+        for factor, done in DONE.items():
+            other = {key: factor * value for key, value in group.items()}
+            yield f"{name} {done}", replace_numbers(scene, other)
+    for text, loads in _list_wrong_loads(scene):
         yield text, replace(scene, loads=loads)
-    for number, effect in enumerate(scene.effects):
-        for text, other_effect in _list_other_laws(scene, effect):
-            effects = (*scene.effects[:number], other_effect)
-            yield text, replace(scene, effects=effects + scene.effects[number + 1 :])
     for bar in MOVING_BARS:
         if scene.drive is None and bar != scene.drive_bar:
             text = f"the torque acts on bar {bar} instead of bar {scene.drive_bar}"
@@ -120,11 +97,7 @@ def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
-    """List other numbers of inertia, of gravity and of springs.
-
-    Torsion springs are within half a turn of their rest, so that a turn more is a
-    preload.
-    """
+    """List other numbers of inertia and of gravity."""
     gravity = _find_gravity(scene)
     for text, (by_mass, by_inertia) in _INERTIAL.items():
         numbers = {"effects.gravity.0": gravity.magnitude / by_mass}
@@ -136,20 +109,9 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         along_y = {"effects.gravity.0": 9.81, "effects.gravity.1": -math.pi / 2.0}
         yield "gravity along -y is included though the scene has none", along_y
     with_ground = gravity.angle + scene.linkage.ground_angle
+    yield "effects.gravity reversed", {"effects.gravity.0": -gravity.magnitude}
     yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
     yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
-    for words, turned in (("larger", TURN), ("smaller", -TURN)):
-        wound = {
-            f"effects.torsion.{pin}": preload - turned * k
-            for effect in scene.effects
-            if isinstance(effect, Torsion)
-            for pin, k, _, preload in effect.springs
-        }
-        preloads = {f"{spring}.preload": value for spring, value in wound.items()}
-        for spring, value in wound.items():
-            yield f"{spring}.rest a turn {words}", {f"{spring}.preload": value}
-        if len(wound) > 1:
-            yield f"effects.torsion.*.rest a turn {words}", preloads
 
 
 def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
@@ -181,17 +143,6 @@ def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
             yield f"bars.{name}: {text}", keyed
             every.setdefault(f"bars.*: {text}", {}).update(keyed)
     yield from every.items()
-    for (name, bar), (other, second) in permutations(moving, 2):
-        masses = {f"bars.{name}.mass": second.mass}
-        yield f"bars.{name}: mass of the {other}", masses
-        if BAR_NUMBERS[name] < BAR_NUMBERS[other]:
-            text = f"bars.{name} and bars.{other}: mass and inertia are exchanged"
-            exchanged = {
-                f"bars.{other}.mass": bar.mass,
-                f"bars.{name}.inertia": second.moment_of_inertia,
-                f"bars.{other}.inertia": bar.moment_of_inertia,
-            }
-            yield text, masses | exchanged
 
 
 def _find_gravity(scene: Scene) -> Gravity:
@@ -200,53 +151,25 @@ def _find_gravity(scene: Scene) -> Gravity:
 
 
 def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, tuple[Load, ...]]]:
-    """Let each load, and every load, act elsewhere or in another direction."""
-    changed: dict[str, dict[int, dict[str, Any]]] = {}
+    """Let each load, and every load, act elsewhere or in another direction.
+
+    Loads take off the weight of each bar.
+    """
+    changed: dict[str, dict[int, Load]] = {}
     for number, load in enumerate(scene.loads):
         for text, fields in _list_changes(scene, load).items():
-            with suppress(InputError):
-                replace(load, **fields)
-                one = f"loads.{number} (bar {load.bar}): {text}"
-                changed[one] = {number: fields}
-                changed.setdefault(f"loads.*: {text}", {})[number] = fields
-    pushing = [number for number, load in enumerate(scene.loads) if load.force]
-    for numbers in combinations(pushing, 2):
-        first, second = (
-            {key: getattr(scene.loads[number], key) for key in PLACES_OF_LOADS}
-            for number in numbers
-        )
-        text = "the places of loads.{} and loads.{} are exchanged".format(*numbers)
-        changed[text] = dict(zip(numbers, (second, first), strict=True))
+            with suppress(InputError):  # no load can be so
+                other = replace(load, **fields)
+                changed[f"loads.{number} (bar {load.bar}): {text}"] = {number: other}
+                changed.setdefault(f"loads.*: {text}", {})[number] = other
     for text, others in changed.items():
         if len(others) > 1 or not text.startswith("loads.*"):
-            with suppress(InputError):  # no load can be so
-                yield (
-                    text,
-                    tuple(
-                        replace(load, **others.get(number, {}))
-                        for number, load in enumerate(scene.loads)
-                    ),
-                )
-
-
-def _list_wrong_weights(scene: Scene) -> Iterator[tuple[str, tuple[Load, ...]]]:
-    """Let each weight, and every weight, act elsewhere; loads carry it there."""
+            numbered = enumerate(scene.loads)
+            yield text, tuple(others.get(number, load) for number, load in numbered)
     gravity = _find_gravity(scene)
-    moved: dict[str, tuple[Load, ...]] = {}
     for name, bar in list_moving(scene):
-        pull = gravity.magnitude * bar.mass
-        weight, lift = (
-            Load(BAR_NUMBERS[name], (force, gravity.angle)) for force in (pull, -pull)
-        )
-        places = {"its first pin": (0.0, 0.0), "mid-bar": (0.5 * bar.length, 0.0)}
-        text = f"the weight of bar {lift.bar}"
-        yield f"{text} is missing", (*scene.loads, lift)
-        for where, place in places.items():
-            elsewhere = lift, replace(weight, from_centre=None, from_pin=place)
-            yield f"{text} acts at {where}", (*scene.loads, *elsewhere)
-            others = moved.get(f"every weight acts at {where}", scene.loads)
-            moved[f"every weight acts at {where}"] = (*others, *elsewhere)
-    yield from moved.items()
+        lift = Load(BAR_NUMBERS[name], (-gravity.magnitude * bar.mass, gravity.angle))
+        yield f"the weight of bar {lift.bar} is missing", (*scene.loads, lift)
 
 
 def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
@@ -286,18 +209,3 @@ def _list_changes(scene: Scene, load: Load) -> dict[str, dict[str, Any]]:
     else:
         changes["its direction turns with the bar"] = {"frame": "bar"}
     return changes
-
-
-def _list_other_laws(scene: Scene, effect: Any) -> Iterator[tuple[str, Any]]:
-    """List other laws of friction or springs, or the flywheel on another bar."""
-    if isinstance(effect, Flywheel):
-        bar = {2: 4, 4: 2}[effect.bar]
-        yield f"the flywheel is on bar {bar}", replace(effect, bar=bar)
-    if isinstance(effect, Springs):
-        both = tuple(replace(spring, acts=None) for spring in effect.springs)
-        yield "the springs act both ways", Springs(both)
-    for law, (kind, taken) in _LAWS.items():
-        if isinstance(effect, kind) and not any(
-            isinstance(one, taken) for one in scene.effects
-        ):
-            yield law, taken(effect.rows)
