@@ -522,11 +522,6 @@ TABLE = {"table": fourbar.Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
 DRAWN = replace(SPRING, preload=-4.0)
 PULLING, PUSHING = (replace(SLACK, acts=acts) for acts in ("pull", "push"))
 SLIDING = replace(SCENE, motion=Motion(Sweep(3.5, 5.0, 12), 10.0, 5.0))
-(SLIP,) = {
-    math.copysign(0.5, slip)
-    for solution in [fourbar.solve(SLIDING)]
-    for slip in solution.omega_4 - solution.omega_3
-}
 RUBBED = replace(SLIDING, effects=(Friction.at(B=0.5),))
 MOVING = ("input", "coupler", "output")
 BARS = {name: getattr(SCENE.linkage, name) for name in MOVING}
@@ -535,7 +530,6 @@ WEIGHTS = tuple(
     Load(number, (9.81 * bar.mass, -0.5 * math.pi), from_pin=bar.mass_centre)
     for number, bar in enumerate(BARS.values(), 2)
 )
-RUBBING = Viscous((("A", 0.2),))
 WOUND = with_torsion((2.0, 0.4, 0.5), (1.0, 1.0, -0.3))
 ARM, FROM_PIN = with_load(arm=PLACE), with_load(from_pin=PLACE)
 AT_PIN = {"from_pin": (0.0, 0.0)}

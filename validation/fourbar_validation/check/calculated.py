@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects import Flywheel
-from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
-from fourbar.solving import solve
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.variants import Mistake, drop_remainder, solve_other
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
@@ -294,26 +292,22 @@ def _find_other_branch(judge: Judge) -> Iterator[Mistake]:
     """Yield the mistake of the other branch from where the numbers change."""
     keys = ("theta_3", "theta_4", *judge.columns)
     column = judge.columns[next(filter(judge.columns.__contains__, keys))]
-    error, allowed, _ = column.judged_right
-    if not (error > allowed).any():
-        return
     opposite = judge.at._replace(branch=-judge.at.branch)
-    try:
-        other = solve(judge.scene, judge.stage, at=opposite)
-    except FourBarError:
+    other = solve_other("", judge.scene, opposite)
+    others = column.predict(other.predict)
+    if others is None:
         return
-    left = column.compare(column.take(other))[0] < error
-    places = np.flatnonzero(left)
-    if not len(places) or places[0] == 0:
+    nearer = column.compare(others)[0] < column.judged_right[0]
+    start = int(np.argmax(nearer))
+    if not start:
         return
-    start = int(places[0])
-    here = np.degrees(judge.at.angle[start])
 
     def predict(quantity: str) -> Array | None:
-        ours, theirs = (getattr(one, quantity, None) for one in (judge.right, other))
+        ours, theirs = getattr(judge.right, quantity, None), other.predict(quantity)
         if ours is None or theirs is None:
             return None
         return np.concatenate((ours[:start], theirs[start:]))
 
+    here = np.degrees(judge.at.angle[start])
     place = f"{judge.at.commanded} = {here:.4g} deg"
     yield Mistake(f"the other branch from {place} on", predict)

@@ -4,6 +4,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -54,11 +55,10 @@ class Judgement(Judge):
         known = {k: one for k, one in self.columns.items() if one.quantity in UNITS}
         motion = [k for k in known if STAGE_OF.get(known[k].quantity) != "force"]
         for keys in dict.fromkeys((tuple(known), tuple(motion))):
-            columns = {key: self.table.columns[key] for key in keys}
-            table = replace(self.table, columns=columns)
-            part = Judge(self.scene, table, self.tolerance, self.rows)
-            wrong = [key for key in sorted(keys) if known[key].label in labels]
-            found = explain(part, [part.columns[key] for key in wrong]) if wrong else []
+            part = copy(self)
+            part.columns = {key: known[key] for key in keys}
+            wrong = [known[key] for key in sorted(keys) if known[key].label in labels]
+            found = explain(part, wrong) if wrong else []
             if found:
                 is_all = len(keys) == len(known)
                 return [one._replace(complete=one.complete and is_all) for one in found]

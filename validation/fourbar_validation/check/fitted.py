@@ -48,6 +48,8 @@ NEAR_ENOUGH = 10.0 * CARRIED
 """Factor on what is allowed within which a ratio is looked at more closely: the best
 fit has no more of the rounding of its numbers than that.
 """
+FITTED = "(fitted)"
+"""End of the text of a mistake whose number has no plain name."""
 REVERSED = "sign reversed, or F_ij given for F_ji"
 _AXES = {
     (False, 0.0): "",
@@ -215,7 +217,7 @@ class _Family(NamedTuple):
 
 
 def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
-    """Fit numbers of the scene, the command's speed and its zero.
+    """Fit numbers of the scene, the command's speed and its zero, whole ones first.
 
     Each family is fitted by Gauss and Newton to the columns that differ.
     """
@@ -229,8 +231,9 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     at = drop_remainder(judge.at)
     for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
         fitted = _fit(columns, family, right)
-        if fitted is not None and np.abs(fitted).max() > LEAST_NUMBER:
-            yield family.make(*fitted)._replace(times=CARRIED)
+        for numbers in () if fitted is None else (np.round(fitted), fitted):
+            if np.abs(numbers).max() > LEAST_NUMBER:
+                yield family.make(*numbers.tolist())._replace(times=CARRIED)
 
 
 def _fit(columns: list[JudgedColumn], family: _Family, here: Array) -> Array | None:
@@ -303,8 +306,8 @@ def _scale(
     scene: Scene, at: Command, name: str, group: dict[str, float], factor: float
 ) -> Mistake:
     numbers = {key: factor * value for key, value in group.items()}
-    text = f"{name} {factor:.6g} times ours (fitted)"
-    if done := DONE.get(round(factor, 6)):
+    text = f"{name} {factor:.6g} times ours {FITTED}"
+    if done := DONE.get(factor):
         text = f"{name} {done}"
     return solve_other(text, replace_numbers(scene, numbers), at)
 
@@ -312,7 +315,7 @@ def _scale(
 def _move_centre(scene: Scene, at: Command, bar: str, x: float, y: float) -> Mistake:
     r, phi = math.hypot(x, y), math.atan2(y, x)
     numbers = {f"bars.{bar}.centre.0": r, f"bars.{bar}.centre.1": phi}
-    text = f"bars.{bar}.centre at {r:.6g} m and {math.degrees(phi):.4f} deg (fitted)"
+    text = f"bars.{bar}.centre at {r:.6g} m and {math.degrees(phi):.4f} deg {FITTED}"
     return solve_other(text, replace_numbers(scene, numbers), at)
 
 
@@ -325,7 +328,7 @@ def _rub(
     rubbed = copy_with(rubbed, **{rubbed.field: (*rows.items(), (pin, k))})
     unit = kind.numbers[""].unit
     text = (
-        f"effects.{kind.key}.{pin} {k:.6g} {unit}, which the scene leaves out (fitted)"
+        f"effects.{kind.key}.{pin} {k:.6g} {unit}, which the scene leaves out {FITTED}"
     )
     return solve_other(text, replace(scene, effects=(*others, rubbed)), at)
 
@@ -364,5 +367,5 @@ def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
 
 
 def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
-    text = f"{rate} {factor:.6g} times ours (fitted)"
+    text = f"{rate} {factor:.6g} times ours {FITTED}"
     return solve_other(text, scene, at._replace(**{field: factor * getattr(at, field)}))

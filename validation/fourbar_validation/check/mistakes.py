@@ -20,6 +20,7 @@ from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.fitted import (
     ENOUGH_DIGITS,
     ENOUGH_NUMBERS,
+    FITTED,
     REVERSED,
     find_fitted,
 )
@@ -207,7 +208,8 @@ def explain(
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
 
-    The most complete come first. A mistake of the calculation breaks no quantity that
+    The most complete come first; what has a plain name, and explains all, comes alone.
+    A mistake of the calculation breaks no quantity that
     agreed as it was; those of columns count together.
     """
     least = ENOUGH_EXPLAINED * len(differing)
@@ -226,6 +228,9 @@ def explain(
                     found.append(explanation)
         if any(explanation.complete for explanation in found):
             break
+    plain = [one for one in found if not one.text.endswith(FITTED)]
+    if any(one.complete for one in plain):
+        found = plain
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
         found = [one for one in found if one.whole]

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -17,7 +16,7 @@ from fourbar.scene import Command, Scene, command
 from fourbar.solution import compute_times
 from fourbar.solving import solve
 from fourbar_validation.check.theirs import TheirTable
-from fourbar_validation.compare.tolerance import EPS, wrap_difference
+from fourbar_validation.compare.tolerance import EPS, divide, wrap_difference
 
 _AS_PRINTED = 4.0 * EPS
 """Relative difference of a position that went to degrees and back."""
@@ -27,10 +26,9 @@ is found they differ by the square root of round-off.
 """
 _BY_CHANCE = 0.05
 """Probability of rounded times at which the law has every angle as it is printed."""
-_TIMES_TRIED = 65
-"""Times within the rounding of a printed one at which a law is looked at."""
-_ANGLES_TRIED = 721
-"""Angles of a turn at which another bar is looked at."""
+_NEWTON = 40
+"""Steps to the time at which a law has an angle: few, but where it turns back there.
+"""
 _HALVINGS = 60
 """Halvings after which an interval of doubles is none."""
 
@@ -82,8 +80,8 @@ def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands
 
     # zeros at the ends of times may be left off
     filled = table.place._replace(rounding=table.place.filled)
-    near = _command_beside(replace(table, place=filled), command_at)
-    return RowCommands(command_at(0.0), near, by_time=True)
+    found = _command_rounded(replace(table, place=filled), command_at)
+    return found._replace(by_time=True)
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
@@ -131,10 +129,10 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     else:
         at = base if same else _command_each(base, table.places, scene)
 
-        def command_at(shift: Array) -> Command:
+        def command_at(shift: Array | float) -> Command:
             return at.as_doubles()._replace(angle=at.angle + shift)
 
-        found = RowCommands(at, _command_beside(table, command_at))
+        found = _command_rounded(table, command_at)._replace(at=at)
     near = found.near or (found.at,)
     for field in stated:
         half = table.find_half(table.columns[rates[field == "acceleration"]])
@@ -155,15 +153,14 @@ def _command_rates_beside(
     )
 
 
-def _command_beside(
+def _command_rounded(
     table: TheirTable,
-    command_at: Callable[[Array], Command],
-) -> tuple[Command, ...]:
-    """Command the rows at both ends of the rounding of their places."""
-    rounding = table.find_half(table.place)
-    if not rounding.any():
-        return ()
-    return command_at(-rounding), command_at(rounding)
+    command_at: Callable[[Array | float], Command],
+) -> RowCommands:
+    """Command the rows, and both ends of the rounding of their places."""
+    half = table.find_half(table.place)
+    near = (command_at(-half), command_at(half)) if half.any() else ()
+    return RowCommands(command_at(0.0), near)
 
 
 def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
@@ -178,7 +175,7 @@ def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands
         motion = scene.motion.replace(angle=table.places + shift)
         return command(replace(scene, motion=motion))
 
-    return RowCommands(command_at(0.0), _command_beside(table, command_at))
+    return _command_rounded(table, command_at)
 
 
 def _list_stated_rates(
@@ -232,7 +229,7 @@ def _follow_law(
     rounding = rounding + _AS_PRINTED * (1.0 + np.abs(table.places))
 
     def measure(time: Array) -> Array:
-        return np.asarray(wrap_difference(law.at(time)[0] - table.places))
+        return np.asarray(wrap_difference(table.places - law.at(time)[0]))
 
     def fits(time: Array) -> NDArray[np.bool_]:
         return np.abs(measure(time)) <= rounding
@@ -249,9 +246,12 @@ def _follow_law(
     half = np.where(fits_stated, filled, half)
     half = np.where(fits_stated & np.isin(printed, (first, last)), 0.0, half)
     ends = [np.clip(printed + side, first, last) for side in (-half, half)]
-    nearest, several = _find_root(measure, ends[0], ends[1], stated, _TIMES_TRIED)
+    nearest = stated
+    for _ in range(_NEWTON):
+        step = divide(measure(nearest), law.at(nearest)[1])
+        nearest = np.clip(nearest + step, *ends)
     time = np.where(fits_stated, stated, nearest)
-    off = ~fits_stated & several | ~(np.abs(measure(time)) <= rounding + _ONE_PLACE)
+    off = ~(np.abs(measure(time)) <= rounding + _ONE_PLACE)
     if off.any():
         names = scene.motion.names[1:]
         if all(name in table.columns for name in names):
@@ -270,38 +270,6 @@ def _follow_law(
         return RowCommands(at, by_time=True)  # nobody rounded these times
     near = tuple(command_at(_find_last_that_holds(fits, time, end)) for end in ends)
     return RowCommands(at, near, by_time=True)
-
-
-def _find_root(
-    measure: Callable[[Array], Array],
-    low: Array,
-    high: Array,
-    wanted: Array,
-    tried: int,
-    last: float = math.inf,
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return where a measure is 0 between two ends, nearest to what is wanted, (n,).
-
-    It is where the measure is smallest if it has no zero. Marked are the rows with
-    several zeros. Those up to a last place count before others.
-    """
-    places = low + np.linspace(0.0, 1.0, tried)[:, None] * (high - low)
-    apart = np.array([measure(place) for place in places])
-    changes = (apart[1:] > 0.0) != (apart[:-1] > 0.0)
-    changes &= np.abs(apart[1:] - apart[:-1]) < math.pi
-    before = changes & (places[:-1] <= last)
-    changes = np.where(before.any(axis=0), before, changes)
-    rows = np.arange(len(wanted))
-    away = np.abs(0.5 * (places[1:] + places[:-1]) - wanted)
-    chosen = np.argmin(np.where(changes, away, np.inf), axis=0)
-    start, end = places[chosen, rows], places[chosen + 1, rows]
-    above = measure(start) > 0.0
-    root = _find_last_that_holds(
-        lambda place: (measure(place) > 0.0) == above, start, end
-    )
-    smallest = places[np.argmin(np.abs(apart), axis=0), rows]
-    counts = changes.sum(axis=0)
-    return np.where(counts > 0, root, smallest), counts > 1
 
 
 def _find_last_that_holds(
@@ -359,36 +327,47 @@ def _find_by_another_bar(
 ) -> RowCommands:
     """Find the commanded angle at which another bar has the angle of each row.
 
+    The other bar is commanded in both assemblies. A position counts if the scene has
+    the angle there, one in the range of the scene before others.
+
     Raises InputError for a row whose angle the motion passes twice.
     """
-    first = np.full(len(table.places), base.angle.min() - _ONE_PLACE)
-    last = base.angle.max() + _ONE_PLACE
+    first, last = base.angle.min() - _ONE_PLACE, base.angle.max() + _ONE_PLACE
 
-    def measure(angle: Array, shift: Array | float = 0.0) -> Array:
-        at = _command_each(base, angle, scene)._replace(speed=None, acceleration=0.0)
-        found = solve(scene, "position", at=at)[table.found_by]
-        return wrap_difference(found - table.places - shift)
+    def find(places: Array) -> Array:
+        found = []
+        for branch in (1, -1):
+            branches = np.full(len(places), branch, dtype=np.int8)
+            at = Command(places, branches, None, 0.0, bar=int(table.found_by[-1]))
+            angle = solve(scene, "position", at=at)[base.commanded]
+            angle = first + np.remainder(angle - first, TURN)
+            at = _command_each(base, angle, scene)._replace(
+                speed=None, acceleration=0.0
+            )
+            theirs = solve(scene, "position", at=at)[table.found_by]
+            fits = np.abs(wrap_difference(theirs - places)) <= _ONE_PLACE
+            found.append(np.where(fits, angle, np.nan))
+        within = np.less_equal(found, last)
+        return np.where(within | ~within.any(axis=0), found, np.nan)
 
-    def find(wanted: Array, shift: Array | float = 0.0) -> tuple[Array, Any]:
-        shifted = partial(measure, shift=shift)
-        turned = first + TURN - 2.0 * _ONE_PLACE
-        return _find_root(shifted, first, turned, wanted, _ANGLES_TRIED, last)
-
-    angle, several = find(first)
+    angles = find(table.places)
+    several = np.abs(np.subtract(*angles)) > _ONE_PLACE
     if several.any():
         row = int(np.argmax(several))
         place = table.places[row] / table.place.unit.factor
-        passed = f"{base.commanded} = {math.degrees(angle[row]):.6g} deg"
+        passed = f"{base.commanded} = {math.degrees(angles[:, row].min()):.6g} deg"
         raise InputError(
             f"line {table.lines[row]}, {table.found_by}",
             f"{place:.6g} {table.place.unit.text}",
             f"the motion passes it at {passed} and again: add a column"
             f" {base.commanded}",
         )
-    angle = np.where(np.abs(measure(angle)) <= _ONE_PLACE, angle, np.nan)
-    at = _command_each(base, angle, scene)
+    angle = np.fmax(*angles)
 
-    def command_at(shift: Array) -> Command:
-        return at._replace(angle=find(angle, shift)[0])
+    def command_at(shift: Array | float) -> Command:
+        shifted = find(table.places + shift)
+        away = np.nan_to_num(np.abs(shifted - angle), nan=np.inf)
+        nearest = np.where(away[0] <= away[1], shifted[0], shifted[1])
+        return _command_each(base, nearest, scene)
 
-    return RowCommands(at, _command_beside(table, command_at))
+    return _command_rounded(table, command_at)
