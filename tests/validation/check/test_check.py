@@ -933,6 +933,9 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     numbers["torque"] *= 1.0 + 1e-4 * np.sin(np.arange(len(numbers["torque"])))
     first = judged(OURS, numbers, tolerance=Allowance(rtol=1e-3)).explanations[0]
     assert "N mm where N m" in first.text and first.complete
+    twice = loads_times(2.0)(THESIS)
+    first = judged(THESIS, twice, FORCES, 4, tolerance=Allowance(1e-3)).explanations[0]
+    assert first.text == "loads doubled" and first.complete
 
 
 def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):

@@ -229,7 +229,7 @@ def explain(
         if any(explanation.complete for explanation in found):
             break
     plain = [one for one in found if not one.text.endswith(FITTED)]
-    if any(one.complete for one in plain):
+    if any(one.complete and one.whole for one in plain):
         found = plain
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
