@@ -10,14 +10,13 @@ centres.
 import math
 from bisect import bisect
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from flint import acb, arb, arb_mat, ctx, fmpq
 
 from fourbar.effects import Load, Place, PointDrive, Table
 from fourbar.linkage import MOVING_BARS, PINS, FourBar
-from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
 from fourbar_validation.engines.description import find_stated_lengths
@@ -26,6 +25,8 @@ Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any
 """A vector of the plane, x + i y, of two balls."""
 BallValues: TypeAlias = dict[str, Ball]
+Spot: TypeAlias = tuple[int, ComplexBall]
+"""A place on a bar: the bar, and a vector from its first pin."""
 
 
 def polar_ball(r: Ball, angle: Ball) -> ComplexBall:
@@ -61,10 +62,12 @@ COMMANDED_FIRST = {
     4: ("c", "b", "a"),
 }
 """Lengths of the commanded bar and of the two others, by the commanded bar."""
-FORCE_COLUMNS = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}
-"""Columns of the unknown pin forces; that of the drive is the last."""
-FORCES_ON = {2: ("F12", "F32"), 3: ("F23", "F43"), 4: ("F14", "F34")}
-"""Forces on a bar, at its first and at its second pin."""
+FORCE_COLUMNS = {"F12": 0, "F32": 2, "F43": 6, "F14": 8}
+"""Columns of the unknown pin forces; each bar has those at its first and at its second
+pin, and that of the drive is the last.
+"""
+REACTIONS = ((2, 4), (3, 5), (6, 10), (7, 11))
+"""Columns of forces that are opposite: F32 and F23 at A, F43 and F34 at B, x and y."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about
 2^-90 / (distance to the nearest singular position), and the cancelled 90 bits are there
@@ -187,8 +190,9 @@ def compute_outputs(
     if not y["condition"] > 0:
         return y
     loop.move(commanded)
-    y |= {f"omega_{bar}": loop.omega[bar] for bar in MOVING_BARS}
-    y |= {f"alpha_{bar}": loop.alpha[bar] for bar in MOVING_BARS}
+    for bar in MOVING_BARS:
+        y[f"omega_{bar}"] = loop.omega[bar]
+        y[f"alpha_{bar}"] = loop.alpha[bar]
     _put_vectors(y, loop.points())
     unit = loop.evaluate_drive(y)
     try:
@@ -209,48 +213,43 @@ def _put_vectors(y: BallValues, vectors: dict[str, ComplexBall]) -> None:
 
 
 class _Wrenches:
-    """Force, and moment about the mass centre, that act on each moving bar.
+    """Force, and moment about the mass centre, that act on each bar.
 
-    `centre`: vectors from the first pins to the mass centres.
+    The ground bears all. `centre`: vectors from the first pins to the mass centres.
     """
 
     def __init__(self, centre: dict[int, ComplexBall]) -> None:
         self.centre = centre
-        self.force: dict[int, ComplexBall] = dict.fromkeys(MOVING_BARS, acb(0))
-        self.moment: dict[int, Ball] = dict.fromkeys(MOVING_BARS, arb(0))
+        self.force: dict[int, ComplexBall] = dict.fromkeys(centre, acb(0))
+        self.moment: dict[int, Ball] = dict.fromkeys(centre, arb(0))
 
     def push(self, bar: int, force: ComplexBall, arm: ComplexBall) -> None:
-        """Add a force at an arm from the first pin; on the ground it does nothing."""
-        if bar in self.force:
-            self.force[bar] += force
-            self.moment[bar] += wedge(arm - self.centre[bar], force)
+        """Add a force at an arm from the first pin."""
+        self.force[bar] += force
+        self.moment[bar] += wedge(arm - self.centre[bar], force)
 
     def twist(self, pin: str, couple: Ball) -> None:
-        """Add a couple to bar j of a pin (i, j), its opposite to bar i.
-
-        Couples on the ground have no effect.
-        """
+        """Add a couple to bar j of a pin (i, j), its opposite to bar i."""
         i, j = PINS[pin]
-        for bar, value in ((j, couple), (i, -couple)):
-            if bar in self.moment:
-                self.moment[bar] += value
+        self.moment[j] += couple
+        self.moment[i] -= couple
 
     def power(self, v_pin: dict[int, ComplexBall], omega: dict[int, Ball]) -> Ball:
         """Return the power at velocities of the first pins and angular speeds."""
         total = arb(0)
-        for bar, force in self.force.items():
+        for bar in MOVING_BARS:
             velocity = v_pin[bar] + acb(0, omega[bar]) * self.centre[bar]
-            total += (force.conjugate() * velocity).real
+            total += (self.force[bar].conjugate() * velocity).real
             total += self.moment[bar] * omega[bar]
         return total
 
-
-class _Spot(NamedTuple):
-    """A place on a bar, by a vector in its axes from the first pin or from G."""
-
-    bar: int
-    offset: ComplexBall
-    from_centre: bool
+    def components(self) -> list[Ball]:
+        """List force and moment of the moving bars, nine balls."""
+        listed = []
+        for bar in MOVING_BARS:
+            force = self.force[bar]
+            listed += [force.real, force.imag, self.moment[bar]]
+        return listed
 
 
 class _Loop:
@@ -262,7 +261,9 @@ class _Loop:
     w: dict[int, ComplexBall]
     """Unit vectors along the bars."""
     sines: dict[int, Ball]
-    """Sine between the two other moving bars, by bar."""
+    """Sine between the two other moving bars, by bar; 3 and 4 turn by it over their
+    lengths where 2 turns by its own.
+    """
     tip: dict[int, ComplexBall]
     """Vectors from the first pin to the second."""
     first_pin: dict[int, ComplexBall]
@@ -279,19 +280,17 @@ class _Loop:
         self.scene = scene
         self.x = dict(inputs)
         """Every number taken, by name."""
-        drive = scene.drive
-        ends = zip(LINE_ENDS, () if drive is None else drive.ends, strict=False)
-        self.ends = {name: self.spot(place, name) for name, (_, place) in ends}
-        if isinstance(drive, PointDrive):
-            self.take("direction", drive.direction)
         self.to_centre = {}
         for bar in MOVING_BARS:
             stated = scene.linkage.bar(bar)
             self.take(f"m{bar}", find_mass(stated))
             self.take(f"I{bar}", find_inertia(stated))
-            self.to_centre[bar] = self.polar(
-                find_centre(stated), f"r{bar}", f"phi{bar}"
-            )
+            self.to_centre[bar] = self.polar(find_centre(stated), f"r{bar}")
+        drive = scene.drive
+        ends = zip(LINE_ENDS, () if drive is None else drive.ends, strict=False)
+        self.ends = [self.spot(place, name) for name, (_, place) in ends]
+        if isinstance(drive, PointDrive):
+            self.take("direction", drive.direction)
 
     def take(self, name: str, stored: Any) -> Ball:
         """Take a number, as it is given or else as the scene stores it."""
@@ -299,19 +298,22 @@ class _Loop:
             self.x[name] = arb(stored)
         return self.x[name]
 
-    def polar(self, pair: tuple[float, float], size: str, angle: str) -> ComplexBall:
+    def polar(self, pair: tuple[float, float], name: str) -> ComplexBall:
         """Take a vector that two numbers state."""
-        return polar_ball(self.take(size, pair[0]), self.take(angle, pair[1]))
+        size, angle = pair
+        return polar_ball(self.take(name, size), self.take(f"{name}_angle", angle))
 
-    def spot(self, place: Place, name: str, number: str = "") -> _Spot:
+    def spot(self, place: Place, name: str) -> Spot:
         """Take a place by its two numbers; of a named point, the point's."""
         if place.point is not None:
             points = self.scene.points
             place = next(one.place for one in points if one.name == place.point)
         pair = place.from_centre if place.from_pin is None else place.from_pin
         assert pair is not None
-        offset = self.polar(pair, f"{name}{number}", f"{name}_angle{number}")
-        return _Spot(place.bar, offset, place.from_centre is not None)
+        offset = self.polar(pair, name)
+        if place.from_pin is None:
+            offset += self.to_centre[place.bar]
+        return place.bar, offset
 
     def turn_by_stroke(self) -> bool:
         """Take angle, speed and acceleration of the bar that a stroke turns.
@@ -322,12 +324,8 @@ class _Loop:
         differentiated.
         """
         x = self.x
-        on_ground, on_bar = sorted(self.ends.values(), key=lambda spot: spot.bar)
-        bar = on_bar.bar
-        held = on_bar.offset
-        if on_bar.from_centre:
-            held += self.to_centre[bar]
-        fixed = polar_ball(arb(1), x["theta_1"]) * on_ground.offset
+        (_, on_ground), (bar, held) = sorted(self.ends, key=lambda spot: spot[0])
+        fixed = polar_ball(arb(1), x["theta_1"]) * on_ground
         if bar == 4:
             fixed -= polar_ball(x["d"], x["theta_1"])
         s = x["stroke"]
@@ -355,16 +353,21 @@ class _Loop:
         """Place the bars along unit vectors."""
         x = self.x
         self.w = {1: polar_ball(arb(1), x["theta_1"]), **w}
-        self.sines = {2: wedge(w[3], w[4]), 3: wedge(w[2], w[4]), 4: wedge(w[2], w[3])}
+        self.sines = {2: wedge(w[3], w[4]), 3: wedge(w[4], w[2]), 4: wedge(w[3], w[2])}
         self.tip = {2: x["a"] * w[2], 3: x["b"] * w[3], 4: x["c"] * w[4]}
         ground = polar_ball(x["d"], x["theta_1"])
         self.first_pin = {1: acb(0), 2: acb(0), 3: self.tip[2], 4: ground}
         self.centre = {bar: w[bar] * self.to_centre[bar] for bar in MOVING_BARS}
+        self.centre[1] = acb(0)
 
-    def arm(self, spot: _Spot) -> ComplexBall:
-        """Return the vector from a bar's first pin to a place on it."""
-        arm = self.w[spot.bar] * spot.offset
-        return self.centre[spot.bar] + arm if spot.from_centre else arm
+    def lay(self, spots: list[Spot]) -> tuple[list[Spot], ComplexBall]:
+        """Return bar and arm from the first pin of each place.
+
+        The vector from the first place to the last is returned too.
+        """
+        arms = [(bar, self.w[bar] * offset) for bar, offset in spots]
+        places = [self.first_pin[bar] + arm for bar, arm in arms]
+        return arms, places[-1] - places[0]
 
     def move(self, commanded: int) -> None:
         """Move the bars: two linear systems of the differentiated loop."""
@@ -372,18 +375,18 @@ class _Loop:
         zero = acb(0)
         side = self.tip | {4: -self.tip[4]}  # the loop is gone round
         first, second = (bar for bar in MOVING_BARS if bar != commanded)
+        across = wedge(side[first], side[second])
 
         def rates(stated: Ball, total: ComplexBall) -> dict[int, Ball]:
             """Solve for the rates of the other bars.
 
             The sum of i side rate is `total`.
             """
-            u = acb(0, 1) * side[first]
-            v = acb(0, 1) * side[second]
-            rest = total - acb(0, stated) * side[commanded]
-            matrix = arb_mat([[u.real, v.real], [u.imag, v.imag]])
-            solved = matrix.solve(arb_mat([[rest.real], [rest.imag]]))
-            others = {first: solved[0, 0], second: solved[1, 0]}
+            rest = acb(0, -1) * total - stated * side[commanded]
+            others = {
+                first: wedge(rest, side[second]) / across,
+                second: wedge(side[first], rest) / across,
+            }
             return {1: arb(0), commanded: stated, **others}
 
         # a probe opens the loop by slip, m/s, and jerk, m/s^2
@@ -434,16 +437,17 @@ class _Loop:
     def _add_load(self, on: _Wrenches, load: Load, k: int) -> None:
         """Add the moment and the force of one load."""
         bar = load.bar
-        force = self.polar(load.force or (0.0, 0.0), f"F_{k}", f"F_angle_{k}")
+        force = self.polar(load.force or (0.0, 0.0), f"F_{k}")
         moment = self.take(f"M_{k}", load.moment)
         factor = self._interpolate(load.table, k) if load.table else 1
         on.moment[bar] += factor * moment
         if load.arm is not None:
-            to_force = self.polar(load.arm, f"at_{k}", f"at_angle_{k}")
+            to_force = self.polar(load.arm, f"at_{k}")
             arm = self.centre[bar] + to_force
         elif load.force is not None:
             assert load.place is not None
-            arm = self.arm(self.spot(load.place, "at", f"_{k}"))
+            _, offset = self.spot(load.place, f"at_{k}")
+            arm = self.w[bar] * offset
         else:
             return
         axes = self.w[bar] if load.frame == "bar" else 1
@@ -471,7 +475,7 @@ class _Loop:
 
     def add_gravity(self, on: _Wrenches, effect: Any) -> None:
         """Add the weights."""
-        field = self.polar((effect.magnitude, effect.angle), "g", "g_angle")
+        field = self.polar((effect.magnitude, effect.angle), "g")
         for bar in MOVING_BARS:
             on.push(bar, self.x[f"m{bar}"] * field, self.centre[bar])
 
@@ -510,22 +514,20 @@ class _Loop:
             stiffness = self.take(f"stiffness_{k}", spring.stiffness)
             length = self.take(f"length_{k}", spring.length)
             preload = self.take(f"pull_{k}", spring.preload)
-            start = spring.start.bar
-            end = spring.end.bar
-            from_start = self.arm(self.spot(spring.start, "start", f"_{k}"))
-            from_end = self.arm(self.spot(spring.end, "end", f"_{k}"))
-            tail = self.first_pin[start] + from_start
-            across = self.first_pin[end] + from_end - tail
+            ends = (spring.start, f"start_{k}"), (spring.end, f"end_{k}")
+            arms, across = self.lay([self.spot(*end) for end in ends])
             pull = stiffness * across
             # else the pull is k times the distance, wherever that ends
             if spring.preload != spring.stiffness * spring.length:
                 distance = abs(across)
                 tension = preload + stiffness * (distance - length)
-                if spring.acts is not None:
-                    tension = _keep_one_way(tension, spring.acts)
+                if spring.acts == "pull":
+                    tension = tension.max(arb(0))
+                elif spring.acts == "push":
+                    tension = tension.min(arb(0))
                 pull = tension / distance * across
-            on.push(start, pull, from_start)
-            on.push(end, -pull, from_end)
+            for (bar, arm), force in zip(arms, (pull, -pull), strict=True):
+                on.push(bar, force, arm)
 
     def evaluate_drive(self, y: BallValues) -> _Wrenches:
         """Return what one N m or one N of the drive does to the bars.
@@ -542,21 +544,19 @@ class _Loop:
             y["drive_condition"] = abs(self.sines[scene.drive_bar])
             unit.moment[scene.drive_bar] = arb(1)
             return unit
-        arms = [(spot.bar, self.arm(spot)) for spot in self.ends.values()]
+        arms, line = self.lay(self.ends)
         if isinstance(drive, PointDrive):
             line = polar_ball(arb(1), self.x["direction"])
             if drive.frame == "bar":
                 line *= self.w[drive.place.bar]
         else:
-            start, end = (self.first_pin[bar] + arm for bar, arm in arms)
-            y["stroke"] = abs(end - start)
-            line = (end - start) / y["stroke"]
+            y["stroke"] = abs(line)
+            line /= y["stroke"]
         for (sense, _), (bar, arm) in zip(drive.ends, arms, strict=True):
             unit.push(bar, int(sense) * line, arm)
         a = self.x["a"]
         per_turn = {2: arb(1), 3: a / self.x["b"], 4: a / self.x["c"]}
-        turning = {2: self.sines[2]}
-        turning |= {bar: -per_turn[bar] * self.sines[bar] for bar in (3, 4)}
+        turning = {bar: per_turn[bar] * self.sines[bar] for bar in MOVING_BARS}
         foot = {2: acb(0), 3: acb(0, turning[2]) * self.tip[2], 4: acb(0)}
         reach = arb(0)
         for bar, arm in arms:
@@ -571,46 +571,32 @@ class _Loop:
         """Solve for the pin forces and the driving torque or force.
 
         Raises ZeroDivisionError where they are singular to working precision. Unknowns
-        are F12 F32 F23 F43 F34 F14 (x, y each) and the drive, of which one acts as
+        are F12 F32 F23 F43 F14 F34 (x, y each) and the drive, of which one acts as
         `unit`. Equations are Newton and Euler about each mass centre, then action and
         reaction at A and B.
         """
+        columns = []
+        needed = _Wrenches(self.centre)
         acting = self.sum_acting()
-        matrix = arb_mat(13, 13)
-        right = arb_mat(13, 1)
-        for row, bar in zip((0, 3, 6), MOVING_BARS, strict=True):
-            centre = self.centre[bar]
-            arms = -centre, self.tip[bar] - centre
-            for name, arm in zip(FORCES_ON[bar], arms, strict=True):
-                column = FORCE_COLUMNS[name]
-                matrix[row, column] = matrix[row + 1, column + 1] = 1
-                matrix[row + 2, column] = -arm.imag
-                matrix[row + 2, column + 1] = arm.real
-            matrix[row, 12] = unit.force[bar].real
-            matrix[row + 1, 12] = unit.force[bar].imag
-            matrix[row + 2, 12] = unit.moment[bar]
-            acceleration = self.a_pin[bar] + self.swing(bar, centre)
-            force = self.x[f"m{bar}"] * acceleration - acting.force[bar]
-            moment = self.x[f"I{bar}"] * self.alpha[bar] - acting.moment[bar]
-            right[row, 0] = force.real
-            right[row + 1, 0] = force.imag
-            right[row + 2, 0] = moment
-        for row, (i, j) in enumerate(((2, 4), (3, 5), (6, 8), (7, 9)), start=9):
-            matrix[row, i] = matrix[row, j] = 1
-        solved = matrix.solve(right)
+        for bar in MOVING_BARS:
+            for arm in (acb(0), self.tip[bar]):
+                for direction in (acb(1), acb(0, 1)):
+                    alone = _Wrenches(self.centre)
+                    alone.push(bar, direction, arm)
+                    columns.append([*alone.components(), 0, 0, 0, 0])
+            acceleration = self.a_pin[bar] + self.swing(bar, self.centre[bar])
+            needed.force[bar] = self.x[f"m{bar}"] * acceleration - acting.force[bar]
+            moment = self.x[f"I{bar}"] * self.alpha[bar]
+            needed.moment[bar] = moment - acting.moment[bar]
+        for row, (action, reaction) in enumerate(REACTIONS, start=9):
+            columns[action][row] = columns[reaction][row] = 1
+        columns.append([*unit.components(), 0, 0, 0, 0])
+        right = arb_mat(13, 1, [*needed.components(), 0, 0, 0, 0])
+        solved = arb_mat(columns).transpose().solve(right)
         forces = {}
-        for name in PIN_FORCES:
-            column = FORCE_COLUMNS[name]
+        for name, column in FORCE_COLUMNS.items():
             forces[name] = acb(solved[column, 0], solved[column + 1, 0])
         return forces, solved[12, 0]
-
-
-def _keep_one_way(tension: Ball, acts: str) -> Ball:
-    """Return the tension of a spring that acts one way; where unsure, both cases."""
-    sense = -1 if acts == "push" else 1
-    if sense * tension > 0:
-        return tension
-    return arb(0) if sense * tension <= 0 else tension.union(arb(0))
 
 
 _TERMS: dict[str, Callable[[_Loop, _Wrenches, Any], None]] = {
@@ -639,13 +625,15 @@ class Responses:
         """Compute the outputs at changed inputs."""
         return compute_outputs(self.scene, self.branch, self.inputs | changed)
 
-    def add(self, total: dict[str, float], moved: BallValues | None) -> None:
-        """Add how far each output has moved, in parts of 2^-STEP_BITS.
+    def add(self, total: dict[str, float], **changed: Ball) -> bool:
+        """Add how far each output moves with changed inputs, in parts of 2^-STEP_BITS.
 
-        An output that has become singular moves infinitely far.
+        An output that becomes singular moves infinitely far. False where the loop does
+        not close.
         """
+        moved = self.move(**changed)
         if moved is None or self.base is None:
-            return
+            return False
         for output, y in self.base.items():
             rate = math.inf
             if output in moved:
@@ -654,6 +642,7 @@ class Responses:
                     change = 2 * arb.pi() - change
                 rate = abs(float((change / self.step).mid()))
             total[output] = total.get(output, 0.0) + rate
+        return True
 
     def add_of_inputs(self, total: dict[str, float], weights: dict[str, float]) -> None:
         """Add how far each output moves as each input moves by its weight.
@@ -663,7 +652,5 @@ class Responses:
         for name, weight in weights.items():
             step = weight * self.step
             value = self.inputs[name]
-            moved = self.move(**{name: value + step})
-            if moved is None:
-                moved = self.move(**{name: value - step})
-            self.add(total, moved)
+            if not self.add(total, **{name: value + step}):
+                self.add(total, **{name: value - step})

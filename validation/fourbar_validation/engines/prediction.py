@@ -262,8 +262,7 @@ def _compute_sensitivity(
                 loop[f"{name}_x"] = loop[f"{name}_y"] = float(hardest)
         for name, most in (("slip", fastest), ("jerk", hardest)):
             for direction in (acb(1), acb(0, 1)):
-                moved = responses.move(**{name: most * step * direction})
-                responses.add(loop, moved)
+                responses.add(loop, **{name: most * step * direction})
     drive = next((name for name in DRIVE_QUANTITIES if name in base), None)
     if drive is not None:
         strongest = max(
@@ -274,8 +273,7 @@ def _compute_sensitivity(
         strongest += abs(base[drive]) / lever
         for bar in MOVING_BARS:
             for total, size in ((loop, strongest), (carried, hardest)):
-                moved = responses.move(**{f"couple_{bar}": size * step})
-                responses.add(total, moved)
+                responses.add(total, **{f"couple_{bar}": size * step})
     return Sensitivities(data, loop, carried)
 
 
