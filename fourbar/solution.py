@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
+from fourbar.formulas.mobility import TURN
 from fourbar.linkage import POSITIVE, require
 from fourbar.quantities import (
     COUPLE,
@@ -548,28 +549,19 @@ def unwrap(angles: Array) -> None:
 
     `angles`: (n,), or (m, n) for as many sweeps.
     """
-    if angles.shape[-1] < 2:
+    if angles.shape[-1] < 2 or (
+        np.ptp(angles) < np.pi and not (angles[..., 0] == -np.pi).any()
+    ):
         return
-    # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
-    begins_at_excluded_end = (angles[..., 0] == -np.pi).any()
-    if np.ptp(angles) < np.pi and not begins_at_excluded_end:
-        return
-    turn = 2.0 * np.pi
     rows = angles.reshape(-1, angles.shape[-1])
-    filled = _fill_gaps(rows)
-    turns = np.zeros_like(filled)
-    jumps = filled[:, 1:] - filled[:, :-1]
-    turns[:, 1:] = np.rint(jumps / turn).cumsum(axis=1)
-    start = np.where(filled[:, :1] == -np.pi, turn, 0.0)
-    angles[...] = (rows + start - turn * turns).reshape(angles.shape)
-
-
-def _fill_gaps(rows: Array) -> Array:
-    """Replace each NaN by the number before it, at the start by the first one."""
     finite = ~np.isnan(rows)
-    if finite.all():
-        return rows
+    # each NaN stands for the number before it, at the start for the first one
     first = finite.argmax(axis=1)[:, None]
     place = np.where(finite, np.arange(rows.shape[1]), first)
     place = np.maximum.accumulate(place, axis=1)
-    return rows[np.arange(len(rows))[:, None], place]
+    filled = np.take_along_axis(rows, place, axis=1)
+    jumps = np.diff(filled, axis=1, prepend=filled[:, :1])
+    turns = np.rint(jumps / TURN).cumsum(axis=1)
+    # -pi as a double lies inside (-pi, pi], yet reads as the excluded end
+    start = np.where(filled[:, :1] == -np.pi, TURN, 0.0)
+    angles[...] = (rows + start - TURN * turns).reshape(angles.shape)

@@ -22,7 +22,7 @@ from fourbar.evaluation.evaluate import (
     withhold_infinite,
 )
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import A_BRANCH, require, require_bar, require_whole
+from fourbar.linkage import A_BRANCH, require_bar, require_whole
 from fourbar.quantities import (
     ANGLES,
     COUPLE,
@@ -233,8 +233,6 @@ class Results:
             shape_of_one = shape if name in SCALARS else (*shape, 2)
             given = request.out.get(name)
             self.arrays[name] = np.empty(shape_of_one) if given is None else given
-        self.sign_may_differ: bool = False
-        """True if sin(theta_4 - theta_3) may have another sign than the branch."""
 
     def store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
         """Store what was evaluated at some positions.
@@ -242,7 +240,6 @@ class Results:
         Values that are no number have the status that says so.
         """
         withhold_infinite(case, evaluated)
-        self.sign_may_differ = self.sign_may_differ or _may_sign_differ(case)
         shape = self.codes[index].shape
         self.codes[index] = evaluated.codes.reshape(shape)
         of_study = len(shape) > 1
@@ -252,17 +249,9 @@ class Results:
                 value = value.reshape(shape)  # noqa: PLW2901
             if name in SCALARS:
                 array[index] = value
-            elif array.strides[-1] == array.itemsize:
-                # x and y next to each other: one copy
-                array.view(complex)[*index, 0] = value
             else:
                 array[*index, 0] = value.real
                 array[*index, 1] = value.imag
-
-
-def _may_sign_differ(case: Case) -> bool:
-    """Return True if sin(theta_4 - theta_3) may have another sign than the branch."""
-    return case.path.bar != 2 or case.path.has_change_point
 
 
 def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | None:
@@ -286,7 +275,6 @@ def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | No
         return None
     results = Results.__new__(Results)
     results.codes = np.array([codes], dtype=np.uint8)
-    results.sign_may_differ = _may_sign_differ(case)
     vectors = table.view(float).reshape(-1, 1, 2)
     scalars = vectors[:, :, 0]
     results.arrays = {}
@@ -324,36 +312,27 @@ def _require_command_at(at: Command) -> None:
     """Raise an InputError unless a command is well formed."""
     expect("at", at, Command)
     require_bar("at.bar", at.bar)
+    expect("at.origin", at.origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
     theta, omega, alpha = COMMAND_NAMES[at.bar]
-    angle, branch, speed, acceleration, _, time, origin = at
-    expect("at.origin", origin, LimitOrigin, StrokeOrigin, ReleaseOrigin, type(None))
-    expect(f"at.{theta}", angle, np.ndarray)
-    n = angle.size
-    arrays: dict[str, Any] = {theta: angle, "branch": branch}
-    if time is not None:
-        arrays["time"] = time
-    for key, value in arrays.items():
-        expect(f"at.{key}", value, np.ndarray)
-        if value.shape != (n,) or value.dtype.kind not in "iuf":
-            raise InputError(f"at.{key}", value, f"must be numbers, shape {(n,)}")
-    are_branches = branch.item() in (1, -1) if n == 1 else (np.abs(branch) == 1).all()
-    if not are_branches:
-        raise InputError("at.branch", branch, f"{A_BRANCH} at each position")
-    if speed is not None:
-        _require_rate(omega, speed, n)
-    _require_rate(alpha, acceleration, n)
-
-
-def _require_rate(name: str, value: Any, n: int) -> None:
-    """Raise an InputError unless a rate is a number, or one for each of n positions."""
-    if isinstance(value, float):
-        return
-    if not isinstance(value, np.ndarray):
-        expect(f"at.{name}", value, float, int, np.integer, np.floating)
-        require(f"at.{name}", value)
-    elif value.shape not in ((), (n,)) or value.dtype.kind not in "iuf":
-        allowed = f"must be numbers, shape () or {(n,)}"
-        raise InputError(f"at.{name}", value, allowed)
+    expect(f"at.{theta}", at.angle, np.ndarray)
+    each = (at.angle.size,)
+    stated = {
+        theta: at.angle,
+        "branch": at.branch,
+        "time": at.time,
+        omega: at.speed,
+        alpha: at.acceleration,
+    }
+    for name, value in stated.items():
+        if value is None and name in ("time", omega):
+            continue
+        numbers = np.asarray(value)
+        is_for_each = isinstance(value, np.ndarray) and numbers.shape == each
+        is_one_rate = name in (omega, alpha) and not numbers.shape
+        if numbers.dtype.kind not in "iuf" or not (is_for_each or is_one_rate):
+            raise InputError(f"at.{name}", value, f"must be numbers, shape {each}")
+    if (np.abs(at.branch) != 1).any():
+        raise InputError("at.branch", at.branch, f"{A_BRANCH} at each position")
 
 
 def find_last_stage(scene: Scene) -> str:
@@ -425,13 +404,11 @@ def make_solution(
         for start, arrays in of_points.items():
             if start + point.name in quantities:
                 arrays[point.name] = quantities.pop(start + point.name)
-    branch = at.branch
-    if results.sign_may_differ:
-        sine = quantities.get("sin_mu")
-        if sine is None:
-            branch = find_signs(scene.linkage, at.angle, at.branch, at.bar)
-        else:
-            branch = np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
+    sine = quantities.get("sin_mu")
+    if sine is None:
+        branch = find_signs(scene.linkage, at.angle, at.branch, at.bar)
+    else:
+        branch = np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
     return Solution.of(
         title=scene.title,
         drive_bar=scene.drive_bar,

@@ -325,3 +325,22 @@ def test_a_command_on_no_branch_is_refused(wrong):
         at = command._replace(angle=command.theta_2[: len(row)], branch=row)
         with pytest.raises(InputError, match=r"at\.branch = .*must be \+1"):
             fourbar.solve(scene, at=at)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"branch": np.array(1)}, {"speed": [1.0, 2.0]}, {"acceleration": "1"}]
+)
+def test_a_command_of_another_shape_is_refused(wrong):
+    scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
+    with pytest.raises(InputError, match=r"must be numbers, shape \(2,\)"):
+        fourbar.solve(scene, at=fourbar.command(scene)._replace(**wrong))
+
+
+def test_the_sign_of_the_branch_is_that_of_the_pose():
+    """Beyond its change point a kite has the other sign in the same assembly."""
+    kite = Scene(uniform(1.0, 2.0, 1.0, 2.0), Motion(np.array([1.0, 4.0])))
+    pin = {"A": np.empty((2, 2))}
+    whole = fourbar.solve(kite)
+    assert whole.branch.tolist() == np.sign(whole.sin_mu).tolist() == [1, -1]
+    at = fourbar.command(kite)
+    assert fourbar.solve(kite, at=at, out=pin).branch.tolist() == [1, -1]
