@@ -240,13 +240,9 @@ class Results:
         Values that are no number have the status that says so.
         """
         withhold_infinite(case, evaluated)
-        shape = self.codes[index].shape
-        self.codes[index] = evaluated.codes.reshape(shape)
-        of_study = len(shape) > 1
+        self.codes[index] = evaluated.codes
         for name, value in evaluated.values.items():
             array = self.arrays[name]
-            if of_study and np.ndim(value):
-                value = value.reshape(shape)  # noqa: PLW2901
             if name in SCALARS:
                 array[index] = value
             else:

@@ -44,14 +44,14 @@ def exact_half_angle(
         where that is known (`Command.remainder`). A position beyond the limit then does
         not assemble, however near.
     unit : of the lengths, m.
-    member : index into numbers of the linkage that are arrays.
+    member : row of numbers of the linkage that are arrays, (m, 1).
     bar : from which the loop is read; theta_2 is its angle.
     lost : what a theta_2 that was computed leaves out as a double, rad.
     """
     from mpmath import mp, mpf
 
     def own(number: Any) -> Any:
-        return mpf(float(number[member] if np.ndim(number) else number))
+        return mpf(float(number[member, 0] if np.ndim(number) else number))
 
     with mp.workdps(WORKING_DIGITS):
         d, a, b, c = (
@@ -111,7 +111,7 @@ def decide_half_angles(
             float(flat[i]),
             remainder,
             unit,
-            i,
+            i // shape[-1] if shape else 0,
             bar,
             left_out[i],
         )

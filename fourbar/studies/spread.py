@@ -25,7 +25,7 @@ from fourbar.studies.keys import (
     read_numbers,
     refuse_key,
 )
-from fourbar.studies.study import Study, solve_some, vary
+from fourbar.studies.study import Study, solve_some, take_positions, vary
 from fourbar.writing import (
     describe_extent,
     list_names,
@@ -193,12 +193,7 @@ def tolerances(
     gone = np.zeros(len(study), dtype=bool)
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns in split(n, max(1, EVALUATED_AT_ONCE // samples)):
-
-        def take(value: Any, columns: slice = columns) -> Any:
-            has_columns = isinstance(value, np.ndarray) and value.size > len(value)
-            return value[:, columns] if has_columns else value
-
-        at = study.at.with_arrays(take)
+        at = take_positions(study.at, slice(None), columns)
         shape = at.angle.shape
         out = {
             name: np.empty(shape if is_scalar(name) else (*shape, 2))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -71,30 +70,26 @@ class Study:
         """
         return solve_some(self, self.at, stage, out, side)
 
-    def case(self, rows: slice, count: int, side: int = 0) -> Case:
-        """Return the case of some members, each repeated for `count` positions."""
-        numbers = {
-            key: _repeat(values[rows], count) for key, values in self.values.items()
-        }
+    def case(self, rows: slice, side: int = 0) -> Case:
+        """Return the case of some members, whose numbers are (k, 1)."""
+        numbers = {key: values[rows, None] for key, values in self.values.items()}
         scene = replace_numbers(self.scene, numbers)
         return Case.of(scene, self.at.bar, side).beside(self.scene)
 
-    def begin(self, rows: slice) -> Command:
-        """Command the positions at which the motions of some members begin, (k,).
+    def begin(self, case: Case, rows: slice) -> Case:
+        """Return the case of some members whose effects begin with their motions.
 
-        A motion begins where the member first assembles; NaN: nowhere, or it changes
-        its branch.
+        A motion begins where the member first assembles. Those of one that assembles
+        nowhere or changes its branch begin nowhere.
         """
-        motion = self.at
-        n = motion.angle.shape[1]
-        half, _ = self.case(rows, n).half_angle(_take_members(motion, rows, slice(n)))
-        assembled = ((half.outer >= 0.0) & (half.inner >= 0.0)).reshape(-1, n)
-        first = np.argmax(assembled, axis=1)
-        branch = motion.branch[rows]
-        begins = assembled.any(axis=1) & (np.ptp(branch, axis=1) == 0)
-        angle = np.take_along_axis(motion.angle[rows], first[:, None], axis=1)[:, 0]
-        start = np.where(begins, angle, np.nan)
-        return Command(start, branch[:, 0], 0.0, 0.0, motion.bar)
+        motion = take_positions(self.at, rows, slice(None))
+        half, _ = case.half_angle(motion)
+        assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
+        first = np.argmax(assembled, axis=1)[:, None]
+        begins = assembled.any(axis=1) & (np.ptp(motion.branch, axis=1) == 0)
+        angle = np.take_along_axis(motion.angle, first, axis=1)
+        start = np.where(begins[:, None], angle, np.nan)
+        return case.begin_at(Command(start, motion.branch[:, :1], 0.0, 0.0, motion.bar))
 
 
 def solve_some(
@@ -112,18 +107,13 @@ def solve_some(
     results = Results(request)
     evaluated = None
     m, n = request.shape
-    block = request.block
-    counts_turns = request.asks_forces and study.scene.counts_turns
     with np.errstate(all="ignore"):
-        for rows in split(m, max(1, block // n)):
-            begin = study.begin(rows) if counts_turns else None
-            for columns in split(n, block):
-                count = columns.stop - columns.start
-                case = study.case(rows, count, side)
-                if begin is not None:
-                    start = begin.with_arrays(partial(_repeat, count=count))
-                    case = case.begin_at(start)
-                positions = _take_members(at, rows, columns)
+        for rows in split(m, max(1, request.block // n)):
+            case = study.case(rows, side)
+            if request.asks_forces and study.scene.counts_turns:
+                case = study.begin(case, rows)
+            for columns in split(n, request.block):
+                positions = take_positions(at, rows, columns)
                 # kept until the next block is evaluated, so that its memory is used
                 # again
                 evaluated = evaluate(
@@ -140,23 +130,15 @@ def solve_some(
     return solution
 
 
-def _take_members(at: Command, rows: slice, columns: slice) -> Command:
-    """Take some positions of some members, one after the other, (k,)."""
-    count = len(range(at.angle.shape[1])[columns])
+def take_positions(at: Command, rows: slice, columns: slice) -> Command:
+    """Take some positions of some members, (k, l)."""
 
-    def flat(value: Any) -> Any:
+    def take(value: Any) -> Any:
         if np.ndim(value) < 2:
             return value
-        if value.shape[1] == 1:
-            return _repeat(value[rows, 0], count)
-        return value[rows, columns].reshape(-1, *value.shape[2:])
+        return value[rows] if value.shape[1] == 1 else value[rows, columns]
 
-    return at.with_arrays(flat)
-
-
-def _repeat(values: Any, count: int) -> Any:
-    """Repeat each entry of an array; a number stays."""
-    return values if count == 1 or not np.ndim(values) else np.repeat(values, count)
+    return at.with_arrays(take)
 
 
 def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
