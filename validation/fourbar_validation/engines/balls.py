@@ -190,9 +190,8 @@ def compute_outputs(
     if not y["condition"] > 0:
         return y
     loop.move(commanded)
-    for bar in MOVING_BARS:
-        y[f"omega_{bar}"] = loop.omega[bar]
-        y[f"alpha_{bar}"] = loop.alpha[bar]
+    y |= {f"omega_{bar}": loop.omega[bar] for bar in MOVING_BARS}
+    y |= {f"alpha_{bar}": loop.alpha[bar] for bar in MOVING_BARS}
     _put_vectors(y, loop.points())
     unit = loop.evaluate_drive(y)
     try:
