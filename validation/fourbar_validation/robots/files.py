@@ -196,7 +196,12 @@ class _RobotReading:
         pins = self._take_pins(root)
         kept = ("link", "joint", "material")
         others = [child for child in root if child.tag not in kept]
-        left_out = {child.tag for child in others}
+        joining = [
+            one
+            for one in others
+            if len({end.tag for end in one.findall("*[@link]")}) > 1
+        ]
+        left_out = {child.tag for child in others if child not in joining}
         if any("xacro}" in tag for tag in left_out):
             raise self._refuse(
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
@@ -212,8 +217,7 @@ class _RobotReading:
         self.notes += [
             f"<{one.tag}> {one.get('name', 'without a name')} joins two links, but is"
             " left out"
-            for one in others
-            if len({end.tag for end in one.findall("*[@link]")}) > 1
+            for one in joining
         ]
         if closing:
             self.notes.append(

@@ -217,6 +217,31 @@ def test_a_weld_of_three_joints_leaves_no_freedom():
     )
 
 
+LINKS = """
+<mujoco><default><joint axis="0 0 1"/><geom size=".01"/></default><worldbody>
+<body name="a"><joint/><geom/><body name="b" pos=".1 .1 0"><joint/><geom/>
+<body name="c" pos=".3 0 0"><joint/><geom/><body name="d" pos="0 -.1 0"><joint/><geom/>
+</body></body></body></body></worldbody><equality><weld {}/></equality></mujoco>
+"""
+
+
+@pytest.mark.parametrize("ends", ['body1="d"', 'body1="world" body2="d"'])
+def test_a_weld_may_join_halves_of_the_ground(ends):
+    loop = loop_of(LINKS.format(ends))
+    assert loop.lengths == approx((0.4, math.hypot(0.1, 0.1), 0.3, 0.1))
+    assert loop.bodies == {1: (0, 4), 2: (1,), 3: (2,), 4: (3,)}
+
+
+def test_a_closure_of_what_hangs_on_a_bar_acts_on_it():
+    pad = (
+        '<body name="pad" pos=".1 0 0"><joint name="pad" axis="0 0 1"/>'
+        '<geom size=".01"/></body>'
+    )
+    pin = '<equality><connect body1="pad" body2="ground" anchor="0 0 0"/></equality>'
+    loop = loop_of(Planar(on_coupler=pad, more=pin).text())
+    assert loop.other_equalities == (1,)
+
+
 @pytest.mark.parametrize("limited", ["", 'limited="true" range="0 3"'])
 def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(limited):
     """The frame of the ball's body is tilted: its axis is not that of the others.
@@ -518,6 +543,8 @@ def test_loops_that_share_bars_are_counted_together(held, counts, ground):
     inner = f"e, f, h on {ground} (50.00, 200.0, 141.4, 111.8 mm) are a four-bar"
     assert f"{inner}, but e belongs to another loop too" in second.reason
     assert "--hold" not in second.reason and "motors" not in second.reason
+    alone = TWO_LOOPS.replace('name="loop1"', 'name="loop1" active="false"')
+    assert "loop1" not in report_of(alone, held=held).closures[1].reason
 
 
 PUSHED = """

@@ -99,6 +99,35 @@ def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
         assert qpos[0] == approx(require("handle", joints["handle"], "rad"))
 
 
+@pytest.mark.parametrize(
+    "place, told", [(".18", "the loops are closed again"), ("9", "no pose near this")]
+)
+def test_loops_without_common_joints_close_each_by_itself(place, told):
+    """No one joint that starts elsewhere closes both."""
+    bodies, _, closure = CLAMP.partition("</worldbody>")
+    _, _, other = bodies.replace('"handle"', '"grip"').partition("<worldbody>")
+    other = re.sub('name="(coupler|rocker)"', r'name="other_\1"', other)
+    other = other.replace('pos=".18 ', f'pos="{place} ')
+    pin = '<connect site1="other_coupler" site2="other_rocker"/></equality>'
+    both = closure.replace("</equality>", pin)
+    posed = pose(f"{bodies}{other}</worldbody>{both}")
+    (note,) = posed.notes
+    assert note.startswith(told)
+    handle, grip = (position(posed, name) for name in ("handle", "grip"))
+    assert handle == position(pose(CLAMP), "handle") != 0.0
+    assert (handle == grip) == (place == ".18")
+
+
+def test_equalities_that_share_a_joint_close_together():
+    hinge = '<body><joint name="{}"/><geom size=".1"/></body>'
+    tie = '<joint joint1="{}" joint2="{}" polycoef=".1 1 0 0 0"/>'
+    ties = "".join(map(tie.format, "bdc", "acb"))
+    text = f"<worldbody>{''.join(map(hinge.format, 'abcd'))}</worldbody>"
+    posed = pose(f"<mujoco>{text}<equality>{ties}</equality></mujoco>")
+    assert np.diff(posed.data.qpos) == approx(0.1, abs=1e-9)
+    assert posed.notes[0].startswith("the loops are closed again")
+
+
 @pytest.mark.slow
 def test_a_loop_closes_beside_the_turns_that_its_pose_counts():
     key = f'<key name="turned" qpos="{8.0 * math.pi!r} 0 0"/>'
@@ -161,7 +190,7 @@ def test_a_pose_that_cannot_close_says_what_is_left():
 @pytest.mark.parametrize(
     "joints, words",
     [
-        ({"crank": "20"}, "the unit is missing; .* in rad or with a unit"),
+        ({"crank": "20"}, 'the unit is missing; .* like "1 rad"'),
         ({"crank": "20 mm"}, "crank"),
         ({"wheel": "20deg"}, "no such joint"),
     ],

@@ -6,9 +6,10 @@ no joint parts, or a held one, are one bar.
 """
 
 import math
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations, islice, pairwise, permutations
+from operator import itemgetter
 
 import mujoco
 import numpy as np
@@ -63,7 +64,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     find_joint,
     pose_robot,
 )
-from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, list_bars
 
 _PIN_BETWEEN = {frozenset(bars): pin for pin, bars in PINS.items()}
 """Pins by the two bars that each joins."""
@@ -199,6 +200,26 @@ class _Chain:
         self.hinges = [one for one, kind in types.items() if kind == HINGE_JOINT]
         self.others = {one: types[one] for one in types if one not in self.hinges}
         """Type of each joint that is no hinge."""
+        place, _ = find_ends(model, finder.data, number)
+        arms = np.cross(place - finder.data.xanchor, finder.data.xaxis)
+        away = np.linalg.norm(arms, axis=1) > LARGEST_RESIDUAL
+        self.away = [one for one in self.joints if one in self.others or away[one]]
+        """Its joints but the hinges on whose axis its closure lies."""
+        axes = finder.data.xaxis
+        skews = [
+            (float(np.linalg.norm(np.cross(*axes[[*pair]]))), pair)
+            for pair in combinations(self.hinges, 2)
+        ]
+        self.most_skew: tuple[int, ...]
+        """The two hinges whose axes are farthest from parallel."""
+        sine, self.most_skew = max(skews, key=itemgetter(0), default=(0.0, ()))
+        self.skew = math.asin(min(sine, 1.0))
+        """Angle between them, rad."""
+
+    @property
+    def is_idle(self) -> bool:
+        """Tell whether its closure lies on the axes of all hinges, and holds none."""
+        return self.is_pin and not self.away
 
     @property
     def pins(self) -> int:
@@ -232,11 +253,10 @@ class _Finder:
         """
         for number in list_closing(model):
             chain = _Chain(self, number)
-            away = self._list_away(chain)
             is_of_two = chain.is_pin and len(chain.joints) == 2
-            if chain.is_active and is_of_two and len(away) == 1:
-                (self.standing[number],) = away
-                self.held.update(away)
+            if chain.is_active and is_of_two and len(chain.away) == 1:
+                (self.standing[number],) = chain.away
+                self.held.update(chain.away)
         self.root = find_roots(model, self.held)
         self.chains = {one: _Chain(self, one) for one in list_closing(model)}
         self.normals = find_normals(model, self.data, self.held)
@@ -248,17 +268,6 @@ class _Finder:
         """Return the bar that a joint turns, and the one that bears it."""
         body = int(self.model.jnt_bodyid[joint])
         return self.root[body], self.root[find_parent(self.model, body)]
-
-    def _list_away(self, chain: _Chain) -> list[int]:
-        """List the joints of a chain but the hinges on whose axis its closure lies."""
-        place, _ = find_ends(self.model, self.data, chain.number)
-        arms = np.cross(place - self.data.xanchor, self.data.xaxis)
-        near = np.linalg.norm(arms, axis=1) <= LARGEST_RESIDUAL
-        return [one for one in chain.joints if one in chain.others or not near[one]]
-
-    def _is_idle(self, chain: _Chain) -> bool:
-        """Tell whether a closure lies on the axes of all its hinges, and holds none."""
-        return chain.is_pin and not self._list_away(chain)
 
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
@@ -299,9 +308,8 @@ class _Finder:
             yield f"other joints {', '.join(others)}"
         if loop is not None:
             yield loop.describe_lengths()
-        angle, _ = self._measure_axes(chain)
-        if angle is not None:
-            apart = math.degrees(angle)
+        if chain.most_skew:
+            apart = math.degrees(chain.skew)
             yield f"axes {apart if apart > PRINTED_AS_ZERO else 0.0:.2g} deg apart"
         if chain.is_pin:
             first, second = find_ends(model, self.before, chain.number)
@@ -347,11 +355,10 @@ class _Finder:
             yield _SWITCHED_OFF
         if not chain.joints:
             yield "both ends are on one rigid body"
-        if self._is_idle(chain):
+        if chain.is_idle:
             yield self._explain_idle(chain)
         model = self.model
-        angle, names = self._measure_axes(chain)
-        is_skew = angle is not None and angle > PARALLEL
+        is_skew = chain.skew > PARALLEL
         is_four = chain.pins == len(PINS)
         if [*chain.others.values()] == [BALL] and is_four and not is_skew:
             yield self._explain_ball(chain)
@@ -361,7 +368,7 @@ class _Finder:
         for joint, kind in chain.others.items():
             if kind != SLIDE or not is_skew:  # a slider-crank lies in a plane
                 yield f"{name_joint(model, joint)} {self._explain_joint(chain, kind)}"
-        if angle is not None and is_skew:
+        if is_skew:
             spatial = f"the loop is spatial ({_SERVE_SPATIAL})"
             places = self.data.xanchor[chain.hinges].round(6)
             if len(np.unique(places, axis=0)) < len(places):
@@ -369,7 +376,8 @@ class _Finder:
                     ", unless hinges in one place are a ball, and all else is parallel:"
                     " --hold those of the ball that turn across"
                 )
-            degrees = math.degrees(angle)
+            names = " and ".join(name_joint(model, one) for one in chain.most_skew)
+            degrees = math.degrees(chain.skew)
             yield f"the axes of {names} are {degrees:.3g} deg apart: {spatial}"
         if not is_four:
             yield self._explain_count(chain)
@@ -451,18 +459,6 @@ class _Finder:
             f" {second.name} closes the loop"
         )
 
-    def _measure_axes(self, chain: _Chain) -> tuple[float | None, str]:
-        """Return the largest angle between two hinges' axes, rad, and which two."""
-        largest: float | None = None
-        names = ""
-        for pair in combinations(chain.hinges, 2):
-            across = np.cross(*self.data.xaxis[[*pair]])
-            angle = math.asin(min(1.0, float(np.linalg.norm(across))))
-            if largest is None or angle > largest:
-                largest = angle
-                names = " and ".join(name_joint(self.model, joint) for joint in pair)
-        return largest, names
-
     def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, or a weld of few joints.
 
@@ -491,17 +487,16 @@ class _Finder:
         finder = _Finder(replace(self.posed, options=options))
         return finder.describe(chain.number).loop is not None
 
-    def _list_others(self, chain: _Chain) -> list[_Chain]:
-        """List the other active closures."""
-        chains = self.chains.values()
-        return [one for one in chains if one.is_active and one is not chain]
-
     def _find_coupled(self, chain: _Chain) -> list[_Chain]:
         """List the other closures whose loops move the same bars.
 
         Loops that share bars with such a loop are among them.
         """
-        others = [one for one in self._list_others(chain) if not self._is_idle(one)]
+        others = [
+            one
+            for one in self.chains.values()
+            if one.is_active and one is not chain and not one.is_idle
+        ]
         joints = {*chain.joints}
         coupled: list[_Chain] = []
         while more := [other for other in others if joints & {*other.joints}]:
@@ -518,7 +513,7 @@ class _Finder:
         joint best.
         """
         count = max(chain.pins - len(PINS), 0)
-        driven = {*self._list_motors(chain)}
+        driven = {*list_motors(self.model)}.intersection(chain.joints)
         several = len(driven) > 1
         hinges = [one for one in chain.hinges if (one in driven) == several]
         stiffness = self.model.jnt_stiffness
@@ -579,7 +574,7 @@ class _Finder:
             first, last = (self.root[end] for end in one.ends)
             pins[frozenset((first, last))], _ = find_ends(model, self.data, one.number)
         moved = {self.join(joint)[0] for one in coupled for joint in one.joints}
-        bars = {bar for pair in pins for bar in pair}
+        bars = frozenset[int]().union(*pins)
         for inner in permutations(bars - {first, last}, 2):
             cycle = [first, *inner, last]
             ground = cycle.index(min(cycle, key=lambda bar: len(climb(model, bar))))
@@ -600,15 +595,6 @@ class _Finder:
                 f" four-bar, but {', '.join(shared)} belongs to another loop too"
             )
         return ""
-
-    def _find_bar(self, body: int, bars: Container[int]) -> int:
-        """Return the bar that carries a body, however far down, or the world."""
-        above = (self.root[one] for one in climb(self.model, body))
-        return next((root for root in above if root in bars), 0)
-
-    def _list_motors(self, chain: _Chain) -> list[int]:
-        """List the joints of a chain on which what takes a control acts."""
-        return [joint for joint in list_motors(self.model) if joint in chain.joints]
 
     def _describe_pulling(self, chain: _Chain) -> str:
         """Describe the motors that move joints of a chain."""
@@ -643,7 +629,7 @@ class _Finder:
             halves = {*groups[0], *groups.pop()}
             groups[0] = tuple(sorted(halves, key=lambda body: body != chain.ground))
         # group i lies between joint i - 1 and joint i
-        at_ground = next(i for i, group in enumerate(groups) if chain.ground in group)
+        at_ground = chain.bars.index(chain.ground) % len(groups)
         groups = groups[at_ground:] + groups[:at_ground]
         joints = joints[at_ground:] + joints[:at_ground]
         # the ground lies between the joints at the end and at the beginning
@@ -676,7 +662,7 @@ class _Finder:
             senses=senses,
             cut_bars=tuple(bars[self.root[end]] for end in chain.ends),
             axes=np.eye(3),
-            misaligned=self._measure_axes(chain)[0] or 0.0,
+            misaligned=chain.skew,
             qpos=data.qpos.copy(),
             held=tuple(sorted({*range(self.model.njnt)} - {*hinges.values()})),
         )
@@ -700,7 +686,7 @@ class _Finder:
                 " pin by two sites"
             )
         closures, others = self._sort_equalities(loop)
-        remarks = _describe_offset(self.posed, closures, loop, normal)
+        remarks = self._describe_offset(closures, loop, normal)
         return replace(
             loop,
             closures=closures,
@@ -740,7 +726,7 @@ class _Finder:
             stated = find_joint(model, self.options.drive, "--drive")
             if stated in at_ground:
                 return stated, []
-        driven = self._list_motors(chain)
+        driven = [joint for joint in list_motors(model) if joint in chain.joints]
         if not driven:  # one that takes no control drives by a speed that it keeps
             driven = [joint for joint in at_ground if list_actuators(model, joint)]
         names = ", ".join(dict.fromkeys(name_joint(model, joint) for joint in driven))
@@ -764,8 +750,9 @@ class _Finder:
         """Return the equalities of the closing pin, and others on moving bars."""
         model = self.model
         bars = {root: bar for bar, roots in loop.bodies.items() for root in roots}
-        moving = [root for root, bar in bars.items() if bar != 1]
+        on_bar = list_bars(model, loop)
         frame = LoopFrame(loop, self.data)
+        nearest = max(COINCIDENT_PINS * max(loop.lengths), LARGEST_RESIDUAL)
         closures = [loop.equality]
         others: list[int] = []
         for number in np.flatnonzero(model.eq_active0).tolist():
@@ -776,16 +763,20 @@ class _Finder:
                 others.append(number)
                 continue
             chain = self.chains[number]
-            carrying = [self._find_bar(end, moving) for end in chain.ends]
-            numbers = frozenset(bars.get(root, 1) for root in carrying)
+            numbers = frozenset(on_bar[end] or 1 for end in chain.ends)
             if len(numbers) == 1:
                 continue
             if not all(self.root[end] in bars for end in chain.ends):
                 others.append(number)
                 continue
-            pin = _PIN_BETWEEN.get(numbers)
-            places = find_ends(model, self.data, number)
-            if not (pin and chain.is_pin and _is_at(frame, pin, places)):
+            pin = _PIN_BETWEEN.get(numbers, "")
+            near = False
+            if pin and chain.is_pin:
+                bar, _ = PINS[pin]
+                ends = find_ends(model, self.data, number)
+                away = (ends - frame.locate(bar, pin)) @ frame.axes.T
+                near = np.linalg.norm(away, axis=1).max() <= nearest
+            if not near:
                 raise _NoFourBarError(
                     f"{chain.name} holds two of its bars as well: no freedom is left"
                 )
@@ -793,40 +784,28 @@ class _Finder:
             (closures if pin == loop.cut else others).append(number)
         return tuple(closures), tuple(others)
 
+    def _describe_offset(
+        self, closures: tuple[int, ...], loop: RobotLoop, normal: Array
+    ) -> list[str]:
+        """Say how far the ends of a closure are apart along the axes, and its cost.
 
-def _is_at(frame: LoopFrame, pin: str, ends: list[Array]) -> bool:
-    """Tell whether both ends of another equality lie on the axis of a pin."""
-    near = max(COINCIDENT_PINS * max(frame.loop.lengths), LARGEST_RESIDUAL)
-    place = frame.locate(PINS[pin][0], pin)
-    return all(
-        float(np.linalg.norm(frame.in_plane(end - place))) <= near for end in ends
-    )
-
-
-def _describe_offset(
-    posed: PosedRobot,
-    closures: tuple[int, ...],
-    loop: RobotLoop,
-    normal: Array,
-) -> list[str]:
-    """Say how far the ends of a closure are apart along the axes, and what that costs.
-
-    The list is empty where they lie in one plane.
-    """
-    ends = (find_ends(posed.model, posed.data, number) for number in closures)
-    offset = max(abs(float((first - second) @ normal)) for first, second in ends)
-    if offset <= COINCIDENT_PINS * max(loop.lengths):
-        return []
-    alone = copy_for_closures(posed.model, closures)
-    alone.opt.disableflags |= find_bits("frictionloss")
-    data = mujoco.MjData(alone)
-    data.qpos[:] = posed.data.qpos
-    mujoco.mj_forward(alone, data)
-    total = np.sum([read_equality_force(data, one) for one in closures], axis=0)
-    across = float(total @ normal)
-    in_plane = float(np.linalg.norm(total - across * normal))
-    return [
-        f"its ends are {write_length(offset)} mm apart along the axes, which no motion"
-        f" closes: MuJoCo's constraint carries {abs(across):.4g} N across the plane and"
-        f" {in_plane:.4g} N in it, let go at rest in this pose"
-    ]
+        The list is empty where they lie in one plane.
+        """
+        ends = (find_ends(self.model, self.data, number) for number in closures)
+        offset = max(abs(float((first - second) @ normal)) for first, second in ends)
+        if offset <= COINCIDENT_PINS * max(loop.lengths):
+            return []
+        alone = copy_for_closures(self.model, closures)
+        alone.opt.disableflags |= find_bits("frictionloss")
+        data = mujoco.MjData(alone)
+        data.qpos[:] = self.data.qpos
+        mujoco.mj_forward(alone, data)
+        total = np.sum([read_equality_force(data, one) for one in closures], axis=0)
+        across = float(total @ normal)
+        in_plane = float(np.linalg.norm(total - across * normal))
+        return [
+            f"its ends are {write_length(offset)} mm apart along the axes, which no"
+            " motion closes: MuJoCo's constraint carries"
+            f" {abs(across):.4g} N across the plane and {in_plane:.4g} N in it, let go"
+            " at rest in this pose"
+        ]

@@ -241,10 +241,6 @@ class LoopInside:
     def _find_turn(self) -> Array:
         """Return the turn of the commanded bar by each degree of freedom, (nv,)."""
         turn = np.zeros(self.model.nv)
-        if self.joint is not None:
-            sense = self.loop.senses[DRIVEN_PINS[self.bar]]
-            turn[self.model.jnt_dofadr[self.joint]] = sense
-            return turn
         turns = np.zeros((3, self.model.nv))
         body = self.loop.bodies[self.bar][0]
         mujoco.mj_jacBody(self.closure, self.closing, None, turns, body)

@@ -272,27 +272,21 @@ def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
         position = 0.0 if text == "0" else require(f"--pose {name}", text, unit)
         stated[model.jnt_qposadr[joint]] = position
         fixed.add(joint)
-    closing = _Closing(model, held)
-    tied = {*closing.tied, *fixed}
+    closings = [_Closing(model, held, *group) for group in _list_groups(model)]
+    tied = fixed.union(*(one.tied for one in closings))
     outside = [joint for joint in find_outside(model, stated) if joint in tied]
     notes = [*compiled.notes]
     if outside:
         names = ", ".join(name_joint(model, joint) for joint in outside)
         notes.append(f"outside their ranges before closing: {names}")
     closed = stated
-    if closing.size(stated) > CLOSED_IN_THE_FILE or {*outside} - fixed:
-        motors = {*list_motors(model)} - {*outside}
-        closed = closing.close(stated, fixed | motors)
-        # where a motor or a range stops it short of closing
-        for start in (stated, *closing.list_starts(stated, fixed)):
-            if closing.size(closed) <= LARGEST_RESIDUAL:
-                break
-            closed = min(closed, closing.close(start, fixed), key=closing.size)
-        if closing.size(closed) > CLOSED_IN_THE_FILE:  # but for the file's rounding
-            closed = closing.close(closed, fixed)
-    left = closing.size(closed)
+    for closing in closings:
+        closed = closing.find_pose(closed, fixed, {*outside})
+    sizes = [closing.size(closed) for closing in closings]
+    left = max(sizes, default=0.0)
     if left > LARGEST_RESIDUAL:
-        notes.append(closing.say_open(options, stated, left))
+        widest = closings[sizes.index(left)]
+        notes.append(widest.say_open(options, stated, left))
     elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
     data = _evaluate_kinematics(model, closed)
@@ -376,22 +370,42 @@ def _evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
     return data
 
 
-class _Closing:
-    """Least squares of a model's active equalities over the joints that may move."""
+def _list_groups(model: mujoco.MjModel) -> list[tuple[list[int], set[int]]]:
+    """List the active equalities and the joints that they depend on, in groups.
 
-    def __init__(self, model: mujoco.MjModel, held: set[int]) -> None:
-        """Take a model.
+    No joint of a group moves an equality of another.
+    """
+    groups: list[tuple[list[int], set[int]]] = []
+    for number in np.flatnonzero(model.eq_active0).tolist():
+        numbers = [number]
+        joints = list_tied_joints(model, number)
+        for group in [one for one in groups if one[1] & joints]:
+            groups.remove(group)
+            numbers += group[0]
+            joints |= group[1]
+        groups.append((numbers, joints))
+    return groups
+
+
+class _Closing:
+    """Least squares of some equalities over the joints that they depend on."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        held: set[int],
+        equalities: list[int],
+        tied: set[int],
+    ) -> None:
+        """Take equalities and their joints.
 
         `held`: joints that are no joints of a loop.
         """
-        active = np.flatnonzero(model.eq_active0).tolist()
-        self.model = copy_for_closures(model, active)
+        self.model = copy_for_closures(model, equalities)
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
-        tied = (list_tied_joints(model, number) for number in active)
-        self.tied = sorted(set[int]().union(*tied))
-        """Joints on which an active equality depends."""
+        self.tied = sorted(tied)
 
     def _evaluate(self, qpos: Array) -> tuple[Array, Array]:
         """Return the equalities' residuals, (m,), and their Jacobian, (m, nv)."""
@@ -405,6 +419,25 @@ class _Closing:
         """Return the largest residual in a pose, m or rad."""
         residuals, _ = self._evaluate(qpos)
         return float(np.abs(residuals).max(initial=0.0))
+
+    def find_pose(self, stated: Array, fixed: set[int], outside: set[int]) -> Array:
+        """Return the pose near a stated one in which the loops are closed, (nq,).
+
+        Fixed joints stay. `outside`: joints that are outside their ranges.
+        """
+        beyond = (outside - fixed).intersection(self.tied)
+        if self.size(stated) <= CLOSED_IN_THE_FILE and not beyond:
+            return stated
+        motors = {*list_motors(self.model)} - outside
+        closed = self.close(stated, fixed | motors)
+        # where a motor or a range stops it short of closing
+        for start in (stated, *self.list_starts(stated, fixed)):
+            if self.size(closed) <= LARGEST_RESIDUAL:
+                break
+            closed = min(closed, self.close(start, fixed), key=self.size)
+        if self.size(closed) > CLOSED_IN_THE_FILE:  # but for the file's rounding
+            closed = self.close(closed, fixed)
+        return closed
 
     def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,).
