@@ -18,8 +18,9 @@ from fourbar.errors import (
     write_in_units,
 )
 from fourbar.formulas.mobility import change_points, choose_range, turns_fully
-from fourbar.linkage import BAR_NAMES, FourBar, uniform
+from fourbar.linkage import BAR_NAMES, Bar, FourBar, uniform
 from fourbar.mjcf.model import (
+    FULL_TURN,
     RECIPE,
     Model,
     Settings,
@@ -322,13 +323,15 @@ def compute_mass_ratio(linkage: FourBar) -> float:
 
     The ratio is 1 if one of them has no mass.
     """
-    masses = [
-        (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
-        for bar in (linkage.coupler, linkage.output)
-    ]
+    masses = [reduce_mass(bar) for bar in (linkage.coupler, linkage.output)]
     if min(masses) > 0.0:
         return max(masses) / min(masses)
     return 1.0
+
+
+def reduce_mass(bar: Bar) -> float:
+    """Return the mass at a bar's second pin with its inertia about the first, kg."""
+    return (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
 
 
 def _compute_acceleration_scale(scene: Scene) -> float:
@@ -364,10 +367,6 @@ def _sum_load_inertia(scene: Scene) -> float:
         for term in (*scene.loads, *scene.effects)
     )
     return sum(couples) / acceleration
-
-
-FULL_TURN = 2.0 * math.pi * (1.0 - 1e-9)
-"""rad; a sweep over 0..360 deg may miss the turn by its rounding."""
 
 
 @dataclass
@@ -415,16 +414,12 @@ class WindowMotion:
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
         duration = self.time(self.stop)
-        turns = duration * self.fastest / math.tau
-        per_revolution = turns * settings.steps_per_revolution
         # at the greatest speed throughout: an input that speeds up covers the end of
         # its window in few steps
         width = abs(self.stop - self.start)
-        window = 1.0
-        if 0.0 < width < FULL_TURN:
-            window = settings.steps_per_window * duration * self.fastest / width
+        steps = settings.count_steps(duration * self.fastest, width)
         # a window of 628 steps per revolution must not become one more by a rounding
-        steps = max(math.ceil(max(per_revolution, window) * (1.0 - 1e-9)), at_least)
+        steps = max(math.ceil(steps * (1.0 - 1e-9)), at_least, 1)
         return duration / steps * settings.timestep_scale
 
 

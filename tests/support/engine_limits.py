@@ -21,14 +21,16 @@ from fourbar_validation.engines.limits import (
     FASTEST,
     HEAVIEST,
     LIGHTEST,
+    MOST_UNEVEN,
     NEAREST_CENTRE,
     NEAREST_TOGGLE,
     PROXIMAL_BOUNDARY,
+    QUICKEST_START,
     SLOWEST,
     Boundary,
 )
 from fourbar_validation.engines.mujoco import simulate
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
+from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, merges_points
 from fourbar_validation.engines.mujoco.runner import RunCourse
 from fourbar_validation.scenes.hard_families import (
     draw_lengths_of_type,
@@ -99,6 +101,21 @@ def _loaded(ratio):
     return not answer.alarms and answer.evidence["acceleration_gap"] < SIMULATED.factor
 
 
+def _starts(acceleration):
+    """Tell whether the file brings the crank from rest to its speed in two steps."""
+    timestep = _BASE.motion.speed / (2.0 * acceleration)
+    settings = replace(RECIPE, timestep=timestep)
+    loop = ClosedLoop(write_mjcf(_BASE, settings))
+    mujoco.mj_step(loop.model, loop.data, 10)
+    return not loop.bad()
+
+
+def _in_narrow_window(uneven):
+    """Tell whether a narrow sweep between long bars is followed without an alarm."""
+    scene = dress((uneven, 1.0, 2.0, uneven), 1)
+    return not _simulated(set_angles(scene, np.linspace(1.0, 1.001, 3))).alarms
+
+
 def _compiles(inertia):
     inertias = " ".join([repr(inertia)] * 3)
     try:
@@ -116,8 +133,7 @@ def _centre_kept(r):
     """
     scene = replace_bars(_BASE, output=replace(_BASE.linkage.output, centre=(r, 0.5)))
     loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
-    body = loop.model.body("output").id
-    return loop.model.body_sameframe[body] != mujoco.mjtSameFrame.mjSAMEFRAME_BODY
+    return not merges_points(loop.model)
 
 
 def _proximal(mu):
@@ -141,5 +157,7 @@ MEASURED = (
     Measured(HEAVIEST, 1e10, 1e11, _loaded),
     Measured(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
     Measured(LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
+    Measured(QUICKEST_START, 1e9, 1e11, _starts),
+    Measured(MOST_UNEVEN, 1e3, 1e5, _in_narrow_window),
     Measured(PROXIMAL_BOUNDARY, 1e-8, 0.0, _proximal),
 )

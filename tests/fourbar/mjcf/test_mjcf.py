@@ -29,6 +29,7 @@ from fourbar import (
 from fourbar.formulas.mobility import choose_range, turns_fully
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.document import SETTLING, choose_run
+from fourbar.mjcf.model import FINEST_STEPS
 from fourbar_validation.scenes.random import (
     MACHINES,
     DrawnType,
@@ -205,6 +206,12 @@ def test_massless_bar_is_refused_in_one_line(mass, inertia):
         write_mjcf(crank_rocker(linkage=linkage))
 
 
+def test_a_bar_so_short_that_the_compiler_would_open_the_loop_is_refused():
+    short = FourBar(0.3, Bar(0.1, 1.0), Bar(9e-7, 1.0), Bar(0.22, 1.0))
+    with raises(InputError, match=r"^bars\.coupler\.length = 9e-07 m: [^\n]*$"):
+        write_mjcf(crank_rocker(linkage=short))
+
+
 def test_a_force_whose_flywheel_is_no_double_is_refused_in_one_line():
     scene = crank_rocker(loads=(Load(3, (1e308, 0.4)),))
     with raises(InputError, match=r"^flywheel = inf kg m\^2: [^\n]*$"):
@@ -231,3 +238,8 @@ def test_a_window_has_its_steps_wherever_it_lies():
     run = choose_run(np.array([2.0, 2.25]), 3.0, 0.0)
     count = run.time(run.stop) / run.timestep()
     assert count == approx(round(count)) and count >= RECIPE.steps_per_window
+
+
+def test_a_narrow_window_has_no_finer_steps_than_the_finest():
+    run = choose_run(np.array([2.0, 2.001]), 3.0, 0.0)
+    assert run.timestep() == approx(tau / 3.0 / FINEST_STEPS, rel=0.03)

@@ -24,7 +24,7 @@ from fourbar_validation.run.judge import judge, make_question
 from fourbar_validation.run.law import check_law
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import draw_random_scene
-from tests.support.here import EXACT
+from tests.support.here import EXACT, THROUGH_TIME
 from tests.support.scenes import crank_rocker
 from tests.support.textbook import Textbook
 
@@ -74,6 +74,25 @@ def test_ratios_over_ten_decades_raise_no_alarm():
     assert kinds == {"gravity", "viscous", "friction", "springs", "torsion", "flywheel"}
     for index, scene in zip(drawn, scenes, strict=True):
         assert not [row for row in judge(str(index), scene, EXACT).rows if row.failed]
+
+
+THROUGH_TIME_UNEVEN = {
+    "bar 3 passes mjMAXVAL": (36, 13),
+    "the servo passes mjMAXVAL": (811, 57),
+    "a soft loop": (77, 15),
+    "a flywheel whose torque is rounded": (24, 48),
+    "a torque beyond the joints'": (25, 12),
+    "slow friction": (811, 2),
+    "a load at its pin": (45, 1),
+    "a file that loads hold": (22, 28),
+}
+
+
+@pytest.mark.parametrize("why", THROUGH_TIME_UNEVEN)
+def test_a_simulation_of_uneven_bars_raises_no_alarm(why):
+    scene = draw_random_scene(*THROUGH_TIME_UNEVEN[why], ())
+    rows = judge("uneven", scene, THROUGH_TIME).rows
+    assert not [row for row in rows if row.failed]
 
 
 @pytest.mark.slow

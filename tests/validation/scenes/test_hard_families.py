@@ -25,7 +25,7 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
 )
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.limits import BOUNDARIES
+from fourbar_validation.engines.limits import BOUNDARIES, QUICKEST_START
 from fourbar_validation.engines.mujoco import shipped, simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.shipped import compare_shipped
@@ -388,6 +388,13 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name
     scene = suite.scene(names.index(name))
     row = compare_shipped(name, scene, fourbar.command(scene))
     assert row.verdict == (UNDECIDED if why else AGREES) and why in row.reason
+
+
+def test_a_servo_of_a_narrow_and_fast_sweep_is_beyond_what_mujoco_accelerates():
+    motion = Motion(Sweep(0.1, 0.101, 4), 2000.0)
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
+    row = compare_shipped("fast", scene, fourbar.command(scene))
+    assert row.verdict == UNDECIDED and QUICKEST_START.reason in row.reason
 
 
 def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches():

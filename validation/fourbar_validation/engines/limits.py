@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.mjcf.document import compute_load_ratio
+from fourbar.linkage import FourBar
+from fourbar.mjcf.document import compute_load_ratio, reduce_mass
 from fourbar.scene import Scene
-from fourbar_validation.compare.pins import find_centre
 
 ROUNDING = 1e-8
 """Cosine beyond 1 by which a loop that closes but for rounding may miss."""
@@ -64,11 +63,11 @@ HEAVIEST = Boundary(
     " MuJoCo keeps a softness of 1e-15: the gap grows as their ratio",
 )
 NEAREST_CENTRE = Boundary(
-    "distance of a mass centre from the bar's first pin, least but 0",
+    "distance of a mass centre or force from the bar's first pin, least but 0",
     2e-6,
     "m",
-    "a centre nearer than about 1e-6 m to its pin is silently taken to lie on it (the"
-    " compiler's sameframe)",
+    "a mass centre, or where a force acts, nearer than about 1e-6 m to the first pin is"
+    " silently taken to lie on it (the compiler's sameframe)",
 )
 LIGHTEST = Boundary(
     "mass or inertia of a moving bar, least",
@@ -76,6 +75,19 @@ LIGHTEST = Boundary(
     "kg or kg m^2",
     "mjMINVAL: the compiler raises ValueError for a moving body below it",
     "mujoco-inverse and mujoco-simulated",
+)
+QUICKEST_START = Boundary(
+    "speed of a bar / two timesteps, greatest",
+    1e10,
+    "rad/s^2",
+    "a drive that brings a bar to its speed in two timesteps passes mjMAXVAL = 1e10,"
+    " which MuJoCo takes for a bad state and resets",
+)
+MOST_UNEVEN = Boundary(
+    "greatest / least of lengths, of bars' inertias, of loads and inertial forces",
+    1e3,
+    "",
+    "rounding and the soft loop decide where bars or loads differ by more than 1e3",
 )
 PROXIMAL_BOUNDARY = Boundary(
     "mu of the proximal iteration, least",
@@ -92,6 +104,8 @@ BOUNDARIES = (
     HEAVIEST,
     NEAREST_CENTRE,
     LIGHTEST,
+    QUICKEST_START,
+    MOST_UNEVEN,
     PROXIMAL_BOUNDARY,
 )
 
@@ -99,18 +113,29 @@ BOUNDARIES = (
 def find_exceeded(scene: Scene, speed: float) -> str | None:
     """Return the reason of the limit that a scene exceeds, None if it exceeds none.
 
-    Limits are on speed (rad/s), on loads and on the place of a mass centre.
+    Limits are on speed (rad/s) and on loads.
     """
     if speed > FASTEST.boundary:
         return FASTEST.reason
     if scene.linkage.input.length * speed**2 < SLOWEST.boundary:
         return SLOWEST.reason
-    centres = (abs(find_centre(scene.linkage.bar(number))[0]) for number in MOVING_BARS)
-    if any(0.0 < r < NEAREST_CENTRE.boundary for r in centres):
-        return NEAREST_CENTRE.reason
     if compute_load_ratio(scene) > HEAVIEST.boundary:
         return HEAVIEST.reason
     return None
+
+
+def find_uneven(scene: Scene) -> str | None:
+    """Return why a simulation may lose the motion of a scene's bars, if it may.
+
+    Compared are lengths, inertias about first pins over lengths squared, and loads with
+    inertial forces.
+    """
+    masses = [reduce_mass(bar) for bar in scene.linkage.moving]
+    ratios = [max(sizes) / min(sizes) for sizes in (scene.linkage.lengths, masses)]
+    uneven = max(*ratios, compute_load_ratio(scene))
+    if uneven <= MOST_UNEVEN.boundary:
+        return None
+    return f"{MOST_UNEVEN.reason}, here by {uneven:.1e}"
 
 
 def compute_least_sine(

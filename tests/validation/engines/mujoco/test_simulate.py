@@ -11,11 +11,12 @@ import pytest
 import fourbar
 from fourbar import Bar, Motion, Sweep
 from fourbar.mjcf import RECIPE
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar_validation.compare.compare import Comparison, Demands
-from fourbar_validation.compare.rows import AGREES, FAILS, REFUSES, UNDECIDED
+from fourbar_validation.compare.rows import AGREES, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.asking import ask_at
+from fourbar_validation.engines.limits import MOST_UNEVEN, NEAREST_CENTRE
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.runner import Lead
@@ -192,13 +193,25 @@ def judged(scene):
     return judge("scene", scene, THROUGH_TIME).rows
 
 
-def test_a_simulation_that_fails_names_the_ratio_of_masses(monkeypatch):
+def test_an_alarm_between_bars_that_are_uneven_is_a_declared_limit(monkeypatch):
     ratio = "fourbar.mjcf.document.compute_mass_ratio"
     monkeypatch.setattr(ratio, lambda linkage: 1.0)  # pads for bars of one size
-    (failed,) = (row for row in judged(hood(1e-3)) if row.verdict == FAILS)
-    assert failed.quantity == "torque_inertia"
-    words = "of coupler and output one is 9.1e+06 times lighter"
-    assert failed.reason == f"softness and time step: 1e-05 of the scale; {words}"
+    (refused,) = (row for row in judged(hood(1e-3)) if row.verdict == REFUSES)
+    assert refused.quantity == "torque_inertia"
+    assert refused.reason.startswith("acceleration_gap = ")
+    assert refused.reason.endswith(f"{MOST_UNEVEN.reason}, here by 9.1e+06")
+
+
+def test_a_load_that_the_compiler_moves_to_the_pin_is_a_declared_limit():
+    near = fourbar.Load(3, (10.0, 1.0), from_pin=(8e-7, 0.3))
+    answer = simulate(replace(crank_rocker(), loads=(near,)))
+    assert answer.refusal == NEAREST_CENTRE.reason
+
+
+def test_friction_that_its_soft_constraint_holds_below_its_torque_is_undecided():
+    """Pin A slips slowly, between bars that are light for its torque."""
+    rows = {row.quantity: row.verdict for row in judged(draw_random_scene(811, 2, ()))}
+    assert {rows[pin] for pin in PIN_FORCES} == {UNDECIDED}
 
 
 @pytest.mark.parametrize("links, output", [(0.0, None), (0.01, 0.0)])

@@ -35,6 +35,23 @@ WARNINGS = (
     mujoco.mjtWarning.mjWARN_BADQVEL,
     mujoco.mjtWarning.mjWARN_BADQACC,
 )
+FRICTION_ROWS = (
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
+    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
+)
+"""Types of the constraints that are dry friction."""
+
+
+def merges_points(model: mujoco.MjModel) -> bool:
+    """Tell whether the compiler moved a bar's mass centre or a site to its body's pin.
+
+    The inertial frames of pads may be moved.
+    """
+    on_body = mujoco.mjtSameFrame.mjSAMEFRAME_BODY
+    bars = [model.body(BAR_NAMES[number]).id for number in MOVING_BARS]
+    centres = model.body_ipos[bars][model.body_sameframe[bars] == on_body]
+    sites = model.site_pos[model.site_sameframe == on_body]
+    return bool(centres.any() or sites.any())
 
 
 def find_site_load(

@@ -18,7 +18,7 @@ from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from fourbar_validation.engines.mujoco.closed_loop import FRICTION_ROWS, O2, ClosedLoop
 from fourbar_validation.engines.mujoco.runner import Stepper
 
 RELEASED = "mujoco-forward"
@@ -28,10 +28,6 @@ CLOSURE_TIMESTEPS = 2.0
 takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three hundred times as much
 with 10.
 """
-FRICTION_ROWS = (
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF,
-    mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
-)
 
 
 class MujocoForward:

@@ -28,7 +28,6 @@ from fourbar.effects import Table
 from fourbar.errors import LimitError
 from fourbar.linkage import copy_with
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
-from fourbar.mjcf.document import FULL_TURN
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene
@@ -86,10 +85,7 @@ class Segment:
             return settings.timestep * settings.timestep_scale
         if not self.width or not self.turned:
             return 1e-3
-        most = self.duration * self.turning
-        steps = most / math.tau * settings.steps_per_revolution
-        if self.turned < FULL_TURN:
-            steps = max(steps, settings.steps_per_window * most / self.turned)
+        steps = settings.count_steps(self.duration * self.turning, self.turned)
         least = self.width if at_least is None else at_least
         # what is a whole number must not become one more by a rounding
         unit = self.width if self.course.law is not None else 1
