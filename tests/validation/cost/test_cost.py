@@ -201,30 +201,6 @@ def test_each_quantity_has_its_own_order_and_floor():
     assert not laws_found["F32"].decided and laws.find_floor(ladder, "F32") == 1e-3
 
 
-def test_no_order_is_expected_where_sag_and_softness_mix():
-    """A part of the error that does not depend on the time constant flattens the slope.
-
-    Alone, a slope is a fault.
-    """
-
-    def fit(constant, order):
-        rungs = [
-            point(tc, constant + 1e-5 * tc**order, "sag tc, slow") for tc in (3, 5, 10)
-        ]
-        alone = point(10240, constant, "softness alone, slow")
-        curves = {"sag tc, slow": rungs, "softness alone, slow": [alone]}
-        found = [law for law in laws.fit_laws(curves) if law.quantity == "F14"]
-        (law,) = [law for law in found if "tc" in law.name]
-        return law
-
-    assert fit(0.0, 2.0).holds
-    assert not fit(0.0, 1.0).holds and fit(0.0, 1.0).decided
-    mixed = fit(1e-4, 2.0)
-    assert mixed.mixed and not mixed.decided and "no order expected" in str(mixed)
-    steep = fit(1e-4, 3.5)
-    assert steep.decided and not steep.holds
-
-
 def test_a_quantity_that_no_timestep_brings_down_is_no_law_and_is_reported():
     """In the thesis's mechanism the torque falls by its order with Euler.
 

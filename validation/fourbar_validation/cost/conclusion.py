@@ -146,8 +146,6 @@ def _write_law_sentences(laws: Sequence[ErrorLaw]) -> str:
     failing = dict.fromkeys(law.name for law in decided if not law.holds)
     held = sum(law.holds for law in decided)
     text = f"{held} of {len(decided)} laws of the error hold"
-    if mixed := sum(law.mixed for law in laws):
-        text += f"; {mixed} more have no order, because two sources of error mix"
     if failing:
         text += f"; not: {', '.join(failing)}"
     return text + "."

@@ -33,10 +33,6 @@ _LAWLESS_RISE = 10.0
 of a law, where it has met no floor: between neighbours of a ladder the laws here change
 it by 10 or less, and downwards.
 """
-_MIXES = 1.0 / 30.0
-"""Part of the least error from which on a rest flattens a slope. The rest does not
-depend on the setting.
-"""
 _FIRST_ORDER = 1.0
 _FOURTH_ORDER = 4.0
 _EXPECTED_ORDER = dict.fromkeys(
@@ -59,22 +55,11 @@ class ErrorLaw:
     """Settings where the error jumps up as the steps get finer. No law holds then,
     whatever the other points fit.
     """
-    constant: float = 0.0
-    """Part of the least fitted error that does not depend on the setting."""
-
-    @property
-    def mixed(self) -> bool:
-        """Return whether a part that the setting does not change flattens the slope."""
-        return (
-            self.constant > _MIXES
-            and self.points >= FEWEST_FITTED
-            and self.exponent < self.expected - WITHIN
-        )
 
     @property
     def decided(self) -> bool:
         """Return whether there are enough points for a fit, or a jump rules it out."""
-        return (self.points >= FEWEST_FITTED and not self.mixed) or bool(self.jumps)
+        return self.points >= FEWEST_FITTED or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
@@ -88,12 +73,6 @@ class ErrorLaw:
     def __str__(self) -> str:
         if self.jumps:
             return f"FAILS, {'; '.join(self.jumps)}"
-        if self.mixed:
-            return (
-                f"no order expected, {self.exponent:.2f}: sag and softness mix, of"
-                f" which softness alone makes {100.0 * self.constant:.0f} % of the"
-                " least error"
-            )
         if not self.decided:
             return (
                 f"no fit, {self.points} points above the floor"
@@ -169,12 +148,11 @@ def fit_laws(curves: Mapping[str, Sequence[CostPoint]]) -> list[ErrorLaw]:
         name = f"order of {integrator} in the timestep"
         points = curves.get(f"{integrator}, tc held", ())
         laws += _fit_law(name, points, order, by_steps=True)
-    for name, curve, order, rest in (
-        ("softness in (1-d)", "softness d", 1.0, ""),
-        ("sag at 0.1 rad/s in (1-d)", "sag d, slow", 1.0, ""),
-        ("sag at 0.1 rad/s in tc", "sag tc, slow", 2.0, "softness alone, slow"),
+    for name, curve in (
+        ("softness in (1-d)", "softness d"),
+        ("sag at 0.1 rad/s in (1-d)", "sag d, slow"),
     ):
-        laws += _fit_law(name, curves.get(curve, ()), order, curves.get(rest, ()))
+        laws += _fit_law(name, curves.get(curve, ()), _FIRST_ORDER)
     stiff = (_fit_stiff(curves, quantity) for quantity in ERROR_NAMES)
     return laws + [law for law in stiff if law.points > 0]
 
@@ -183,15 +161,10 @@ def _fit_law(
     name: str,
     points: Sequence[CostPoint],
     expected: float,
-    rest: Sequence[CostPoint] = (),
     *,
     by_steps: bool = False,
 ) -> Iterator[ErrorLaw]:
-    """Fit a law of each quantity.
-
-    `rest`: a point of what does not depend on the setting. The sag is of second order
-    where the error of softness alone is small next to it.
-    """
+    """Fit a law of each quantity."""
     ladder = [point for point in points if point.setting_value > 0.0]
     ladder.sort(key=lambda p: p.setting_value if by_steps else -p.setting_value)
     for quantity in ERROR_NAMES if ladder else ():
@@ -203,11 +176,8 @@ def _fit_law(
                 x = point.setting_value
                 fitted[1.0 / x if by_steps else x] = error
         slope = fit([*fitted], [*fitted.values()])
-        constant = 0.0
-        if rest and 0.0 < min(errors) < math.inf:
-            constant = _list_errors(rest, quantity)[0] / min(errors)
         jumps = tuple(_describe_jumps(ladder, quantity))
-        yield ErrorLaw(name, quantity, *slope, expected, len(fitted), jumps, constant)
+        yield ErrorLaw(name, quantity, *slope, expected, len(fitted), jumps)
 
 
 def _fit_stiff(curves: Mapping[str, Sequence[CostPoint]], quantity: str) -> ErrorLaw:

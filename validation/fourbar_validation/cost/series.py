@@ -20,12 +20,6 @@ MIDDLE = 640
 """Steps per revolution where a setting other than the timestep changes."""
 _IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
 TIME_CONSTANTS = (3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
-_SAGGING_CONSTANTS = (3.0, 4.0, 5.0, 7.0, 10.0)
-"""Steps of the time constant: longer ones follow the load through a turn too late."""
-_SAGGING = 0.999
-"""Impedance at which a slow linkage sags well above the truncation."""
-_MANY_STEPS = 10240
-"""Steps per revolution at which a time constant of ten steps is too short to sag."""
 SOLVER_TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
 _PADS = (1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
@@ -137,7 +131,8 @@ def design_curves(scene: Scene) -> Iterator[SettingCurve]:
     yield SettingCurve("softness tc", tc_varied)
     pads = _vary("pad", "pads {:g}", _PADS, BEST)
     yield SettingCurve("pads", (Spot("no pads", replace(BEST, pad=None), x=1.0), *pads))
-    yield from _vary_sag()
+    for name, bare in (("sag d, slow", False), ("sag d, slow, nothing acts", True)):
+        yield SettingCurve(name, _vary_impedance(), slow=True, bare=bare)
     for solver, iterations in (("Newton", 10), ("CG", 100), ("PGS", 100)):
         settings = replace(BEST, solver=solver, iterations=iterations)
         label = solver + ", tolerance {:g}"
@@ -158,21 +153,3 @@ def _vary_defaults(integrator: str, speed: float) -> SettingCurve:
         steps.sort(key=lambda spot: spot.x)
     spots = tuple(replace(spot, edit=restore_defaults) for spot in steps)
     return SettingCurve(f"{integrator}, MuJoCo's defaults", spots, settled=True)
-
-
-def _vary_sag() -> Iterator[SettingCurve]:
-    """Vary what a loop at rest would sag by.
-
-    The rest of the error at a short time constant is varied too.
-    """
-    sagging = replace(WITHOUT_PADS, impedance=_SAGGING)
-    label = "tc = {:g} steps"
-    by_tc = _vary("time_constant_steps", label, _SAGGING_CONSTANTS, sagging)
-    label = "{} steps a revolution"
-    short = _vary("steps_per_revolution", label, (_MANY_STEPS,), sagging)
-    yield SettingCurve("sag d, slow", _vary_impedance(), slow=True)
-    yield SettingCurve("sag tc, slow", by_tc, slow=True)
-    yield SettingCurve("softness alone, slow", short, slow=True)
-    yield SettingCurve(
-        "sag d, slow, nothing acts", _vary_impedance(), slow=True, bare=True
-    )
