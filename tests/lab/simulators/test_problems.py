@@ -373,11 +373,17 @@ def test_an_answer_at_its_own_motion_is_judged_there():
     assert set(find_levels(judge_answers(problem, answer_file)).values()) != {"A"}
 
 
+HALF = [[1.0, 2.0]] * 5 + [None] * 32
+LONG = [1.0] * 38
+
+
 @pytest.mark.parametrize(
     ("text", "status_of_it", "said"),
     [
         (json.dumps(make_result("newton_128")), 0, LEVELS_TOLD),
-        (json.dumps(make_result("newton_128", F43=None)), 1, "no answer"),
+        (json.dumps(make_result("newton_128", F43=None)), 1, "no answer          0"),
+        (json.dumps(make_result("newton_128", F43=HALF)), 1, "no answer          5"),
+        (json.dumps(make_result("newton_128", torque=LONG)), 1, "no answer         37"),
         ("{", 2, "error: "),
         ("[]", 2, "error: "),
         ('{"schema": "fourbar-result/1", "answers": {}}', 2, "error: "),

@@ -6,6 +6,7 @@ docs/benchmark.md has the format.
 
 import json
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -48,7 +49,7 @@ LARGEST_PROBLEM_FILE = 10**7
 
 
 class JudgedQuantity(NamedTuple):
-    """One quantity of a result, where it is worst."""
+    """One quantity of a result, where it is worst or first has no answer."""
 
     quantity: str
     group: str
@@ -167,18 +168,19 @@ def _judge_quantity(
         (group for group, names in QUANTITIES_OF_GROUP.items() if name in names),
         "motion",
     )
-    ours = np.array(values, dtype=float)
-    try:
-        answered = np.array(theirs, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        answered = np.array(np.nan)
-    if answered.shape != ours.shape or not np.isfinite(answered).all():
-        return JudgedQuantity(name, group, MISSING, math.nan, 0)
+    ours = np.atleast_1d(np.array(values, dtype=float))
+    entries = theirs if isinstance(theirs, list) else [theirs]
+    answered = np.full_like(ours, np.nan)
+    for index, entry in enumerate(entries[: len(ours)]):
+        with suppress(TypeError, ValueError, OverflowError):
+            answered[index] = np.reshape(entry, ours.shape[1:])
+    lacking = [*~np.isfinite(magnitude(answered)), len(entries) > len(ours)]
+    if any(lacking):
+        return JudgedQuantity(name, group, MISSING, math.nan, lacking.index(True))
     size = 1.0
     if not name.startswith("theta"):
-        size = float(magnitude(np.atleast_1d(ours)).max()) or 1.0
-    pair = np.atleast_1d(ours), np.atleast_1d(answered)
-    off = compute_difference(name, *pair) / size
+        size = float(magnitude(ours).max()) or 1.0
+    off = compute_difference(name, ours, answered) / size
     bars = np.atleast_1d(np.array(errors, dtype=float)) / size
     level = next(
         (
