@@ -395,8 +395,8 @@ SAID = {
         is_of_the_instant_after_forward
     ),
     "T2 = actuator_force[drive] - dof_armature[O2] qacc[O2]": gives_torque,
-    "efc_force[0], efc_force[1]: force of bar 4 on bar 3": gives_force_at_B,
-    "cfrc_int[bar][3:5]": gives_forces_at_pins,
+    "efc_force[:3]: force of bar 4 on bar 3": gives_force_at_B,
+    "cfrc_int[bar][3:]": gives_forces_at_pins,
     "MuJoCo counts loads in": counts_loads_in,
     "Without a flywheel the loop yields more": yields_more,
     "With the flywheel as drive they hold to 1e-6": holds_with_a_flywheel,
