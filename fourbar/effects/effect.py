@@ -14,7 +14,7 @@ from fourbar.errors import InputError, LimitError, expect
 from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
-from fourbar.linkage import PINS, FourBar, require
+from fourbar.linkage import PINS, Declared, FourBar
 from fourbar.quantities import Array
 
 Joints = tuple[float, float, float]
@@ -480,10 +480,9 @@ class PinRows(Effect):
     def __post_init__(self) -> None:
         key = f"effects.{self.key}"
         numbers = self.numbers
-        rows = self.rows
-        expect(key, rows, tuple, list)
+        expect(key, self.rows, tuple, list)
         by_pin: dict[str, tuple[Any, ...]] = {}
-        for row in rows:
+        for row in self.rows:
             is_row = isinstance(row, (tuple, list)) and len(row) == 1 + len(numbers)
             if not is_row or not isinstance(row[0], str):
                 named = ", ".join(name or "value" for name in numbers)
@@ -492,10 +491,7 @@ class PinRows(Effect):
             if pin not in PINS or pin in by_pin:
                 reason = f"the pins are {', '.join(PINS)}, each once"
                 raise InputError(f"{key}.{pin}", row[1:], reason)
-            checked = []
-            for (name, declared), value in zip(numbers.items(), values, strict=True):
-                path = f"{key}.{pin}.{name}".rstrip(".")
-                checked.append(require(path, value, *declared[:2]))
-            by_pin[pin] = (pin, *checked)
+            paths = (f"{key}.{pin}.{name}".rstrip(".") for name in numbers)
+            by_pin[pin] = (pin, *map(Declared.check, numbers.values(), paths, values))
         in_order = tuple(by_pin[pin] for pin in PINS if pin in by_pin)
         object.__setattr__(self, self.field, in_order)

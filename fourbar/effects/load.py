@@ -248,10 +248,19 @@ class Load(Effect):
             for corner in self.table.theta_2
         }
 
-    def greatest_force(self, linkage: FourBar) -> float:
-        """Return the force with its lever, and the couple over the bar's length, N.
+    def add_to_mjcf(self, model: Any) -> None:
+        """Add a constant actuator on a site (force) or on the bar (couple)."""
+        if self.table is not None:
+            raise LimitError(
+                "a load that is a table over theta_2 has no counterpart in MJCF"
+            )
+        model.loads.append(self)
 
-        The load is a settled one.
+    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
+        """Return the greatest force at the longest arm.
+
+        The force counts with its lever, the couple over the bar's length; the load is
+        a settled one.
         """
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length
@@ -263,18 +272,6 @@ class Load(Effect):
                 assert self.place is not None
                 reach = abs(self.place.distance)
             total += abs(self.force[0]) * (1.0 + reach / bar.length)
-        if self.table is None:
-            return total
-        return total * max(abs(factor) for factor in self.table.factor)
-
-    def add_to_mjcf(self, model: Any) -> None:
-        """Add a constant actuator on a site (force) or on the bar (couple)."""
         if self.table is not None:
-            raise LimitError(
-                "a load that is a table over theta_2 has no counterpart in MJCF"
-            )
-        model.loads.append(self)
-
-    def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
-        """Return the greatest force at the longest arm."""
-        return self.greatest_force(linkage) * max(linkage.lengths)
+            total *= max(map(abs, self.table.factor))
+        return total * max(linkage.lengths)

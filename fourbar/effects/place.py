@@ -15,7 +15,6 @@ from fourbar.formulas.arithmetic import (
 )
 from fourbar.formulas.motion import State
 from fourbar.linkage import (
-    BAR_NAMES,
     MOVING_BARS,
     SECOND_PIN,
     Declared,
@@ -23,17 +22,17 @@ from fourbar.linkage import (
     Entries,
     FourBar,
     OfBar,
+    Text,
     copy_with,
     list_declared,
     list_fields,
-    require_pair,
-    require_whole,
 )
 
 STATED_PAIR = Declared("m", left_out=None, pair="rad")
 StatedPair = Annotated[tuple[float, float] | None, STATED_PAIR]
 STATED_PLACES = {"from_pin": STATED_PAIR, "from_centre": STATED_PAIR}
 """Forms in which numbers state a place that turns with its bar; `point` is a name."""
+ALL_BARS = (1, *MOVING_BARS)
 COINCIDENT_POINTS = 16.0 * 2.0**-52
 """Part of the paths from O2, bar by bar, below which two points count as one. There is
 no direction between them.
@@ -171,11 +170,11 @@ def settler(linkage: FourBar, points: Iterable[Any]) -> Callable[[Place], Place]
     return lambda place: place.settle(linkage, places)
 
 
-def require_place(key: str, place: object) -> Place:
-    """Return a place, checked; InputError for what is none."""
+def require_place(key: str, place: object, bars: tuple[int, ...] = ALL_BARS) -> Place:
+    """Return a place of one of some bars, checked; InputError for what is none."""
     if not isinstance(place, Place):
         raise InputError(key, place, "must be a fourbar.Place")
-    bar = require_whole(f"{key}.bar", place.bar, BAR_NAMES, "must be 1, 2, 3 or 4")
+    bar = OfBar(bars).check(f"{key}.bar", place.bar)
     forms = {
         name: value for name, value in place._asdict().items() if value is not None
     }
@@ -186,30 +185,25 @@ def require_place(key: str, place: object) -> Place:
             ", ".join(forms) or None,
             "must be a pair from_pin or from_centre, or a point",
         )
-    if place.point is not None:
-        if not isinstance(place.point, str):
-            raise InputError(f"{key}.point", place.point, "must be a point's name")
-        return Place(bar, point=place.point)
-    ((name, pair),) = forms.items()
+    ((name, form),) = forms.items()
     if name == "from_centre" and bar == 1:
         allowed = "the ground has no mass centre: state from_pin"
         raise InputError(f"{key}.from_centre", bar, allowed)
-    checked: Any = {name: require_pair(f"{key}.{name}", pair, STATED_PLACES[name])}
-    return Place(bar, **checked)
+    by: Any = STATED_PLACES.get(name, Text())
+    return Place(bar, **{name: by.check(f"{key}.{name}", form)})
 
 
 class At(NamedTuple):
     """Declaration of a place: its key, and the bars on which it may be."""
 
     key: str = ""
-    bars: tuple[int, ...] = (1, *MOVING_BARS)
+    bars: tuple[int, ...] = ALL_BARS
     is_value: bool = False
     """True if the place is stated in the description's own table."""
 
     def check(self, key: str, value: Any) -> Place:
         """Return the place; InputError for what is none."""
-        place = require_place(key, value)
-        return place._replace(bar=OfBar(self.bars).check(f"{key}.bar", place.bar))
+        return require_place(key, value, self.bars)
 
 
 def states_place(kind: Any) -> bool:

@@ -14,8 +14,6 @@ Number = Any
 """A float, or an array that broadcasts over positions and linkages."""
 PLAIN_TYPES = (int, np.generic)
 """Types of one truth value or status code; a mask of many is an array."""
-_NUMPY = (np.ndarray, np.generic)
-_DOUBLES = {float, np.float64}
 U = 2.0**-53
 """Unit round-off of a double."""
 PI_LOW = 1.2246467991473532e-16
@@ -109,24 +107,9 @@ def vector(x: Number, y: Number) -> Number:
     """
     if type(x) is type(y) is float:
         return complex(x, y)
-    if not (
-        (type(x) is float or isinstance(x, _NUMPY))
-        and (type(y) is float or isinstance(y, _NUMPY))
-    ):
+    if isinstance(x, OfParts) or isinstance(y, OfParts):
         return x + 1j * y
-    kinds = {
-        number.dtype.type if hasattr(number, "dtype") else float for number in (x, y)
-    }
-    if (
-        not isinstance(x, np.ndarray)
-        and not isinstance(y, np.ndarray)
-        and kinds <= _DOUBLES
-    ):
-        return np.complex128(complex(x, y))
-    z = np.empty(
-        np.broadcast(x, y).shape,
-        dtype=complex if kinds <= _DOUBLES else np.result_type(x, y, np.complex64),
-    )
+    z = np.empty(np.broadcast(x, y).shape, np.result_type(x, y, np.complex64))
     z.real = x
     z.imag = y
     return z[()]
