@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.effects import Gravity
+from fourbar.effects import Gravity, PinFriction
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Scene
@@ -51,6 +51,11 @@ SCENES = {
     "ground at 1e7 rad": Scene(bars(*ORDINARY, 1e7), Motion([0.63, 1.57], 10.0)),
     "bars of micrometres": Scene(bars(*TINY), Motion(POSITIONS, 10.0)),
     "positions alone": Scene(bars(*TINY), Motion(POSITIONS)),
+    "friction beside a change point": Scene(
+        bars(0.18, 0.1, 0.26, 0.18),
+        Motion(np.radians([-5.0, 40.0]), 10.0, 10.0),
+        effects=(PinFriction.at(O4=(0.15, 0.006)),),
+    ),
     "two turns of a kite": Scene(bars(0.1, 0.1, 0.2, 0.2), Motion()),
 }
 

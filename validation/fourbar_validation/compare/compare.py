@@ -66,9 +66,9 @@ from fourbar_validation.compare.tolerance import (
     replace_zero_size,
 )
 
-Predicted = Callable[[str, Mask], Array]
+Predicted = Callable[[str, Mask], Array | None]
 """Function that predicts the error of a quantity, in its unit, (n,). It matters at the
-positions of the mask alone.
+positions of the mask alone. None: nothing predicts this quantity.
 """
 AnswerNearby = Callable[[Mask], dict[str, Array]]
 """Function that evaluates every quantity again at the positions of a mask. theta_2 is
@@ -429,7 +429,10 @@ class Comparison:
         predicted = self.demands.predicted
         if predicted is None or not errors.beyond.any():
             return None
-        share = divide(predicted(quantity, errors.beyond), errors.scale.size)
+        expected = predicted(quantity, errors.beyond)
+        if expected is None:
+            return None
+        share = divide(expected, errors.scale.size)
         was_asked = np.isfinite(errors.again)
         share = np.where(was_asked, np.fmin(share, errors.allowed), share)
         return np.nan_to_num(share, nan=0.0, posinf=np.inf)

@@ -38,7 +38,7 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.description import find_unknown, list_speeds
+from fourbar_validation.engines.description import list_speeds
 
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
@@ -47,11 +47,6 @@ LARGEST_FIRST_ORDER = 0.1
 everything divides by leave speeds, forces and the torque undetermined; the torque's own
 first order can cancel.
 """
-
-
-def find_unpredicted(scene: Scene) -> str:
-    """Give the reason why no error is predicted in a scene, if any."""
-    return find_unknown(scene, lambda effect: effect.in_balls, forces=True)
 
 
 def predict_from_data(

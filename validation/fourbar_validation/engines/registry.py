@@ -38,7 +38,6 @@ from fourbar_validation.engines.exact import BallArithmetic, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import (
-    find_unpredicted,
     predict_about_mass_centre,
     predict_for_any_method,
     predict_for_free_bodies,
@@ -350,12 +349,21 @@ def make_prediction(
     predict = engine.predictor
     if command.bar != 2 or command.moves_stroke:
         return None  # the prediction knows the command of bar 2 alone
-    if predict is None or (
-        engine.tolerance.conditioned
-        and (find_missing("flint") or find_unpredicted(scene))
-    ):
+    conditioned = engine.tolerance.conditioned
+    if predict is None or (conditioned and find_missing("flint")):
         return None  # the law in the condition stands alone
-    return lambda quantity, mask: predict(scene, command, quantity, mask)
+    in_balls = scene
+    if conditioned:
+        known = tuple(effect for effect in scene.effects if effect.in_balls)
+        in_balls = replace(scene, effects=known)
+
+    def predict_known(quantity: str, mask: Mask) -> Array | None:
+        # effects have no part in the motion
+        if in_balls != scene and STAGE_OF.get(quantity) == "force":
+            return None
+        return predict(in_balls, command, quantity, mask)
+
+    return predict_known
 
 
 def make_answer_nearby(

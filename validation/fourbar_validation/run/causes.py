@@ -122,9 +122,8 @@ def hold_to_prediction(judge: Judge, predicted: Predicted, rows: slice, n: int) 
         exact = column.exact
         beyond = np.zeros(n, dtype=bool)
         beyond[rows] = ~(exact <= MOST_ALLOWED)
-        if beyond.any():
-            errors = TIMES_PREDICTED * predicted(key, beyond)[rows]
-            share = divide(errors, column.size)
+        if beyond.any() and (expected := predicted(key, beyond)) is not None:
+            share = divide(TIMES_PREDICTED * expected[rows], column.size)
             column.exact = np.where(beyond[rows], share, exact)
 
 
