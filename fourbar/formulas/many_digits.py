@@ -70,13 +70,9 @@ def exact_half_angle(
         lengths = loop(d, a, b, c)
         half = compute_factors(lengths, s * s, k * k, s * k)
         size = 2 * (a + b + c + d) * mp.sqrt(half.inner + (b - c) ** 2)
-        least, most = (
-            (-TOUCHING * size, 0)
-            if remainder is None
-            else (-_RESIDUE * size, _RESIDUE * size)
-        )
+        margin = size * (TOUCHING if remainder is None else _RESIDUE)
         outer, inner = (
-            0 * factor if least <= factor <= most else factor
+            0 * factor if abs(factor) <= margin else factor
             for factor in (half.outer, half.inner)
         )
         return half._replace(outer=outer, inner=inner)

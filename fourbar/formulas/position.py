@@ -152,9 +152,9 @@ def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:
         a = _replace(a, d, kite_at_A)
         c = _replace(c, b, kite_at_A)
     lengths = d, a, b, c
-    stretched = _vanish(exact_difference(b, c, a, d), lengths)
-    with_c = _vanish(exact_difference(d, c, a, b), lengths, d - a)
-    with_b = _vanish(exact_difference(d, b, a, c), lengths, d - a)
+    stretched = vanish(exact_difference(b, c, a, d), lengths)
+    with_c = vanish(exact_difference(d, c, a, b), lengths, d - a)
+    with_b = vanish(exact_difference(d, b, a, c), lengths, d - a)
     return Loop(d, a, b, c, stretched * (a + b + c + d), with_c * with_b)
 
 
@@ -170,7 +170,7 @@ def _replace(length: Number, other: Number, mask: Number) -> Number:
     return length - select(mask, without_slopes(length - other), 0.0)
 
 
-def _vanish(
+def vanish(
     difference: Number,
     lengths: tuple[Number, ...],
     diagonal: Number | None = None,
@@ -178,11 +178,10 @@ def _vanish(
     """Return a difference of lengths, or zero if it is within their rounding.
 
     The rounding is that of their sum; the slopes stay. It stays where it is a visible
-    part of a bar, or of the least length of the diagonal, d - a.
+    part of a length, or of the least length of the diagonal, d - a.
     """
-    d, a, b, c = lengths
     square = difference * difference
-    rounding = TOUCHING * (d + a + b + c)
+    rounding = TOUCHING * sum(lengths)
     touching = square <= rounding * rounding
     if not is_any(touching):
         return difference

@@ -33,6 +33,7 @@ from fourbar.formulas.mobility import (
     turns_fully,
 )
 from fourbar.formulas.path import NO_DIGIT_LEFT, count_turns, prepare_path
+from fourbar.formulas.position import vanish
 from fourbar.linkage import BAR_NAMES, Entries, FourBar, copy_with, require_bar
 from fourbar.quantities import Array
 from fourbar.scene.drawing import DrawnPins
@@ -496,11 +497,14 @@ class _Triangle(NamedTuple):
         """
         length = self.length
         reach = self.reach
-        zero = 0.0 * self.length
         sign = SIDES[side]
-        beyond_length = exact_difference(stroke, reach, length, zero)
-        near = beyond_length * exact_difference(stroke, length, reach, zero)
-        far = exact_difference(length, reach, stroke, zero) * (length + reach + stroke)
+
+        def exceed(first: Any, second: Any, third: Any) -> Any:
+            sides = first, second, third
+            return vanish(exact_difference(*sides, 0.0 * length), sides)
+
+        near = exceed(stroke, reach, length) * exceed(stroke, length, reach)
+        far = exceed(length, reach, stroke) * (length + reach + stroke)
         with np.errstate(all="ignore"):
             near = np.sqrt(near)
             far = np.sqrt(far)
@@ -687,14 +691,12 @@ def command_at(scene: Scene, places: Array) -> Command:
     motion = scene.motion
     bar = motion.bar
     if motion.commanded == "stroke":
-        triangle = _triangle_of(scene)
-        least = abs(triangle.length - triangle.reach)
-        most = triangle.length + triangle.reach
-        outside = places[~((places >= least) & (places <= most))]
+        at = command_stroke(scene, places, *motion.find_rates(places))
+        outside = places[np.isnan(at.angle)]
         if outside.size:
             stroke = float(outside[0])
             raise InputError("motion.stroke", stroke, say_range(scene), unit="m")
-        return command_stroke(scene, places, *motion.find_rates(places))
+        return at
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:
         return Command(places, branch, *motion.find_rates(places), bar)

@@ -162,6 +162,31 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
         assert loads(DRAWN + stated).motion.side == side
 
 
+@pytest.mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4", "stroke"])
+def test_what_is_drawn_at_its_limit_is_singular_there(commanded):
+    """Two bars are in line, or O2 and both ends of a cylinder, whatever is rounded."""
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        x, y, *other = random.integers(20, 90, 4).tolist()
+        A, other = complex(x, y), complex(*other)
+        pins = {
+            "theta_2": (0.0, A, A + other, A + 3.0 * other),
+            "theta_3": (0.0, A, other + 2.0 * A, other),
+            "theta_4": (0.0, A, -2.0 * A, other),
+            "stroke": (0.0, A, A + other, 1.0),
+        }[commanded]
+        text = f"""{write_pins(pins)}[drive]
+from = {{ bar = 1, drawn = ["{-x} mm", "{-y} mm"] }}
+to = {{ bar = 2, drawn = ["{3 * x} mm", "{3 * y} mm"] }}
+[motion]
+{commanded} = "drawn"
+"""
+        here = solve(loads(text))
+        assert list(here.status) == ["singular"]
+        found = [1e3 * complex(*pin[0]) for pin in (here.A, here.B)]
+        assert found == approx(pins[1:3], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "drive",
     [

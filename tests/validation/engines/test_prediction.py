@@ -47,7 +47,7 @@ def touch():
     sense in which it closes.
     """
     limit = next(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
-    angles = limit + np.arange(-6, 7) * EPS
+    angles = limit + np.arange(-30, 31, 4) * EPS
     scene = Scene(ROCKER, Motion(angles, 3.0))
     solution = fourbar.solve(scene)
     closed = angles[(solution.status_code == 0) & mark_touching(ROCKER, angles)]
