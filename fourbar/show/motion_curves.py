@@ -38,8 +38,6 @@ _PANELS_OF_A_TURN, _MOST_FIRST_PANELS = 48, 960
 """Panels that a motion is cut to before they are halved, for each turn of what is
 commanded.
 """
-_MOST_SIZED = 10_000
-"""Positions that tell the sizes of a motion's curves; of a million they take memory."""
 _SAME_EDGE = 1e-9
 """Part of the motion within which two ends of panels are one."""
 _BESIDE_A_BREAK = 1e-6
@@ -58,8 +56,8 @@ _POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
 """Bending moment that is round-off, over the pin forces times the longest bar."""
 _HALF_A_TURN = 1e-6
-"""Turns within which two ranges of angles are half a turn apart. An end in its last
-digits leaves some 1e-8.
+"""Part by which half a turn between two ranges of angles may be more, and is no turn.
+An end in its last digits leaves some 1e-8.
 """
 _Curves = dict[str, tuple[Array, Wanted]]
 """Curves by name, with what is asked of each."""
@@ -259,17 +257,11 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     """Fit the curves of a motion, or take those of its positions."""
     scene = solution.scene
     if not goes_on_between(scene, solution):
-        share = np.ones(len(solution))
-        if is_once_round(solution):
-            share[-1] = 0.0  # the first position again
-        curves = _take_values(_list_curves(solution))
-        panels = Panels.of_positions(solution.at.places, curves, share)
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
-        curves = _take_values(_list_position_curves(extremes))
-        share = np.ones(len(extremes))
-        positions = Panels.of_positions(extremes.at.places, curves, share)
+        positions = _take_positions(extremes, _list_position_curves)
+        panels = _take_positions(solution, _list_curves)
         _mark_poles(scene, solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
     exact, even = _cut(scene, solution)
@@ -279,42 +271,40 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     exact = np.unique(np.concatenate([exact, breaks]))
     edges = _join_edges(exact, even)
 
-    stage = "acceleration" if solution.F12 is None else "force"
-    if solution.omega_4 is None:
-        stage = "position"
-    sized = solution
-    if len(solution) > _MOST_SIZED:
-        rows = np.linspace(0, len(solution) - 1, _MOST_SIZED).astype(np.intp)
-        sized = solve(scene, stage, at=solution.at.part(rows))
-
     def fit(
-        list_curves: Callable[[Solution], _Curves],
-        asked: _Curves,
-        stage: str,
-        most_halvings: int,
+        list_curves: Callable[[Solution], _Curves], stage: str, most_halvings: int
     ) -> Panels:
         def compute(places: Array) -> dict[str, Array]:
             there = solve(scene, stage, at=command_at(scene, places))
             return _take_values(list_curves(there))
 
-        wanted = {name: of_curve for name, (_, of_curve) in asked.items()}
-        panels = fit_panels(compute, edges, wanted, most_halvings)
-        return panels.with_points(exact, compute(exact))
+        at_edges = list_curves(solve(scene, stage, at=command_at(scene, edges)))
+        wanted = {name: of_curve for name, (_, of_curve) in at_edges.items()}
+        return fit_panels(compute, edges, wanted, most_halvings, exact)
 
-    positions = fit(
-        _list_position_curves, _list_position_curves(sized), "position", DEEP
-    )
+    positions = fit(_list_position_curves, "position", DEEP)
     for bar in MOVING_BARS:
         _join_turns(positions, solution, bar)
     panels = positions
     if solution.omega_4 is not None:
-        asked = _list_curves(sized, bent=False)
-        panels = fit(_list_curves, asked, stage, SHALLOW)
+        stage = "acceleration" if solution.F12 is None else "force"
+        panels = fit(_list_curves, stage, SHALLOW)
     reversals, rests = (
         [(place, name) for place, name in found if name in PINS]
         for found in (zeros, rests)
     )
     return MotionCurves(scene, solution, positions, panels, reversals, rests, breaks)
+
+
+def _take_positions(
+    solution: Solution, list_curves: Callable[[Solution], _Curves]
+) -> Panels:
+    """Take the curves at positions alone, as panels of one node each."""
+    share = np.ones(len(solution))
+    if is_once_round(solution):
+        share[-1] = 0.0  # the first position again
+    curves = _take_values(list_curves(solution))
+    return Panels.of_positions(solution.at.places, curves, share)
 
 
 def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
@@ -444,13 +434,10 @@ def _list_position_curves(solution: Solution) -> _Curves:
     return curves
 
 
-def _list_curves(solution: Solution, *, bent: bool = True) -> _Curves:
+def _list_curves(solution: Solution) -> _Curves:
     """List the curves of loads, or where nothing acts of rates, by name.
 
     Commanded rates end, as all others do, where the linkage ceases to assemble.
-
-    `bent`: False to leave out the values of bending moments, which take most of the
-    time, where only what is asked of the curves is wanted.
     """
     scene = solution.scene
     curves: _Curves = {}
@@ -467,10 +454,8 @@ def _list_curves(solution: Solution, *, bent: bool = True) -> _Curves:
         force = np.where(kept[:, None], getattr(solution, name), 0.0)
         curves[name] = force, Wanted(rounding, integrated=True)
     asked = Wanted(rounding * max(solution.lengths))
-    bending = compute_bending(solution) if bent else {}
-    for bar in MOVING_BARS:
-        moment = np.abs(bending[bar].moment) if bent else np.zeros(0)
-        curves[f"bending_{bar}"] = moment, asked
+    for bar, bending in compute_bending(solution).items():
+        curves[f"bending_{bar}"] = np.abs(bending.moment), asked
     drive = read_drive_demand(solution)
     if scene.motion.free is not None:
         return curves
@@ -520,11 +505,10 @@ def compute_bending(solution: Solution) -> dict[int, Bending]:
             compute_bending(solve(scene, at=solution.at.part(rows)))
             for rows in split(count, POSITIONS_OF_A_BLOCK)
         ]
-        bending = {}
-        for bar in MOVING_BARS:
-            columns = zip(*(block[bar] for block in blocks), strict=True)
-            bending[bar] = Bending(*map(np.concatenate, columns))
-        return bending
+        return {
+            bar: Bending(*np.hstack([block[bar] for block in blocks]))
+            for bar in MOVING_BARS
+        }
     forces = [*compute_pin_loads(solution).values()]
     if solution.drive_force is not None:
         forces.append(np.abs(solution.drive_force))
@@ -573,30 +557,25 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
 
     The first stretch has the angles of the solution. The linkage does not pass from one
     stretch to the next, so that no turn of a later one follows from the first: it has
-    the one with which all stretches together cover least.
+    the one that lies nearest.
     """
-    if solution.commanded == f"theta_{bar}":
+    name = f"theta_{bar}"
+    if solution.commanded == name:
         return  # as it is commanded
-    curve = panels.curves[f"theta_{bar}"]
+    curve = panels.curves[name]
     angles = curve.values.ravel()
     rows = np.flatnonzero(np.isfinite(angles))
     stretches = split_runs(rows)
     for stretch in stretches:
         angles[stretch] = np.unwrap(angles[stretch])
-    coarse = getattr(solution, f"theta_{bar}")
-    first = int(np.flatnonzero(np.isfinite(coarse))[0])
+    coarse = getattr(solution, name)
+    first = np.flatnonzero(np.isfinite(coarse))[0]
     away = np.abs(panels.list_nodes().ravel()[rows] - solution.at.places[first])
     nearest = angles[rows[np.argmin(away)]]
     angles += TURN * np.round((coarse[first] - nearest) / TURN)
-    low = np.inf
-    high = -np.inf
-    for stretch in stretches:
-        if low < high:
-            middle = 0.5 * (angles[stretch].min() + angles[stretch].max())
-            away = (0.5 * (low + high) - middle) / TURN
-            # half a turn away is no turn, whatever the rounding
-            turns = np.ceil(np.abs(away) - 0.5 - _HALF_A_TURN)
-            angles[stretch] += TURN * np.copysign(turns, away)
-        low = min(low, angles[stretch].min())
-        high = max(high, angles[stretch].max())
+    middles = [0.5 * (angles[part].min() + angles[part].max()) for part in stretches]
+    for stretch, middle in zip(stretches, middles, strict=True):
+        turns = (middles[0] - middle) / TURN
+        # half a turn away is no turn, whatever the rounding
+        angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * turns)
     curve.values = angles.reshape(curve.values.shape)

@@ -7,7 +7,7 @@ narrow to matter. Towards a pole the values grow with each halving: such a curve
 largest value and no integral.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -73,10 +73,9 @@ _FLAT = 1e-13
 _X, _WEIGHTS = leggauss(NODES)
 _TO_SERIES = np.linalg.inv(legvander(_X, NODES - 1))
 """Matrix from the values at the nodes to the terms of the Legendre series."""
-_DEGREES = np.arange(1.0, NODES)
-_BEYOND_NODES = 0.25 * np.diff(_X).max() * _DEGREES * (_DEGREES + 1.0)
-"""Amounts by which the terms of a series may exceed the values at the nodes: half the
-largest gap of these, times the steepest slope k (k + 1)/2 of each term.
+_BEYOND_NODES = 2.1
+"""Part of their range by which a polynomial may exceed the values at the nodes: half of
+the Lebesgue constant less one.
 """
 _CHECKED = np.array([-1.0, 1.0]) * (1.0 - 2.0 * _BESIDE_END)
 _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
@@ -168,27 +167,6 @@ class Panels:
         for name, values in curves.items():
             single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
         return cls(places, places, share, single, located=False)
-
-    def with_points(self, places: Array, curves: Mapping[str, Array]) -> "Panels":
-        """Return the panels with points between them, panels of no width.
-
-        At the end of a panel a curve that jumps there may have a value of its own.
-        """
-        points = Panels.of_positions(places, curves, np.zeros(len(places)))
-        start = np.append(places, self.start)
-        rises = self.stop[0] > self.start[0]
-        order = np.argsort(start if rises else -start, kind="stable")
-        added = {}
-        for name, curve in self.curves.items():
-            point = points.curves[name]
-            nodes = np.repeat(point.values, NODES, axis=1)
-            values = np.concatenate([nodes, curve.values])[order]
-            error = np.append(point.error, curve.error)[order]
-            poles = np.flatnonzero(np.isin(order - len(places), curve.poles))
-            added[name] = PanelCurve(values, error, poles.tolist())
-        stop = np.append(places, self.stop)[order]
-        share = np.append(points.share, self.share)[order]
-        return Panels(start[order], stop, share, added)
 
     @property
     def length(self) -> float:
@@ -296,15 +274,15 @@ class Panels:
         scale = np.nanmax(np.abs(sizes))
         best = at_nodes.max(axis=1)
         smooth = curve.error <= HELD * scale
-        terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1)
-        excess = terms @ _BEYOND_NODES[: terms.shape[1]]
+        spread = np.ptp(sizes, axis=1)
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
-        is_flat = terms.sum(axis=1) <= _FLAT * scale
+        is_flat = spread <= _FLAT * scale
         x = np.where(is_flat, _INSIDE - 1.0, _X[node])
         values = sizes[rows, node]
-        may_exceed = smooth & ~is_flat & (best + excess >= best.max() - TIED * scale)
-        for row in np.flatnonzero(may_exceed):
+        most = best + _BEYOND_NODES * spread
+        may_exceed = most >= best.max() - TIED * scale
+        for row in np.flatnonzero(may_exceed & smooth & ~is_flat):
             x[row], values[row] = _find_extreme(curve.series[row], rank)
         # the polynomial of a panel that was not settled may exceed the curve
         unsure = smooth & (curve.error > EXTREME_ERROR * scale)
@@ -358,18 +336,26 @@ def _find_panel_zeros(series: Array) -> Array:
 
 
 class _Fit(NamedTuple):
-    """Polynomials of some panels for one curve."""
+    """Polynomials of p panels for k curves, which have c components together."""
 
+    start: Array
+    stop: Array
     values: Array
-    """Values at the nodes, (p, NODES, k)."""
+    """Values at the nodes, (p, NODES, c)."""
     error: Array
-    """Estimate of the error of each, (p,); infinite where some values are missing, zero
-    where all are.
+    """Estimate of the error of each, (p, k); infinite where some values are missing,
+    zero where all are.
     """
     sizes: Array
-    """Values of a scalar, or sizes of vectors, at the nodes and beside the ends,
-    (p, NODES + 2); NaN where they are missing.
+    """Values of scalars, or sizes of vectors, at the nodes and beside the ends,
+    (p, NODES + 2, k); NaN where they are missing.
     """
+    is_open: NDArray[np.bool_]
+    """True where no halving settled a curve, (p, k)."""
+
+    def part(self, rows: Any) -> "_Fit":
+        """Return some of the panels."""
+        return _Fit(*(column[rows] for column in self))
 
 
 def fit_panels(
@@ -377,6 +363,7 @@ def fit_panels(
     edges: Array,
     wanted: Mapping[str, Wanted],
     most_halvings: int = DEEP,
+    points: Array | None = None,
 ) -> Panels:
     """Halve panels until each curve is settled.
 
@@ -386,66 +373,73 @@ def fit_panels(
     edges : ends of the first panels, (p + 1,), in the order of the motion.
     wanted : by name of a curve, what is asked of it.
     most_halvings : number of rounds after which a curve is taken as it is.
+    points : ends of panels that become panels of no width besides. A curve that jumps
+        there may have a value of its own.
     """
-    start = edges[:-1]
-    stop = edges[1:]
-    fits = _fit_panels(compute, start, stop)
-    usual = {}
-    for name, fit in fits.items():
-        # a node next to a pole does not change the size of a curve
-        medians = np.median(np.nan_to_num(np.abs(fit.sizes[:, 1:-1])), axis=1)
-        scale = medians.max() or 1.0
-        usual[name] = float(scale * np.sqrt(np.square(medians / scale).mean()))
-    opens: dict[str, NDArray[np.bool_]] = {}
-    is_new = np.full(len(start), True)
+    fit, first = _fit_panels(compute, wanted, edges[:-1], edges[1:])
+    # a node next to a pole does not change the size of a curve
+    medians = np.median(np.nan_to_num(np.abs(fit.sizes[:, 1:-1])), axis=1)
+    scale = medians.max(axis=0)
+    scale[scale == 0.0] = 1.0
+    usual = scale * np.sqrt(np.square(medians / scale).mean(axis=0))
+    whole = edges[-1] - edges[0]
+    settled: list[_Fit] = []
     for halvings in range(most_halvings + 1):
-        share = (stop - start) / (edges[-1] - edges[0])
-        for name, fit in fits.items():
-            is_open = _find_open(fit, share, usual[name], wanted[name])
-            size = np.fmax.reduce(np.abs(fit.sizes), axis=1)
-            noise = _NOISE * 2.0**halvings * size
-            opens[name] = is_new & is_open & ~(fit.error <= noise)
-        halved = np.any([*opens.values()], axis=0)
+        share = (fit.stop - fit.start) / whole
+        others = [part.sizes for part in settled]
+        is_open = _find_open(fit, others, share, usual, wanted)
+        noise = _NOISE * 2.0**halvings * np.fmax.reduce(np.abs(fit.sizes), axis=1)
+        is_open &= ~(fit.error <= noise)
+        halved = is_open.any(axis=1)
         if halvings == most_halvings or not 0 < halved.sum() <= _MOST_OPEN:
             break
-        middle = 0.5 * (start[halved] + stop[halved])
-        starts = np.concatenate((start[halved], middle))
-        stops = np.concatenate((middle, stop[halved]))
-        start = np.concatenate((start[~halved], starts))
-        stop = np.concatenate((stop[~halved], stops))
-        for name, halves in _fit_panels(compute, starts, stops).items():
-            pairs = zip(fits[name], halves, strict=True)
-            fits[name] = _Fit(*(np.concatenate((c[~halved], h)) for c, h in pairs))
-        is_new = np.arange(len(start)) >= len(start) - len(starts)
-    order = np.argsort(start if edges[-1] > edges[0] else -start)
+        settled.append(fit.part(~halved))
+        middle = 0.5 * (fit.start + fit.stop)[halved]
+        start = np.concatenate((fit.start[halved], middle))
+        stop = np.concatenate((middle, fit.stop[halved]))
+        fit, first = _fit_panels(compute, wanted, start, stop)
+    settled.append(fit._replace(is_open=is_open))
+    if points is not None:
+        of_points, _ = _fit_panels(compute, wanted, points, points)
+        settled.insert(0, of_points)
+    fit = _Fit(*map(np.concatenate, zip(*settled, strict=True)))
+    fit = fit.part(np.argsort(fit.start * np.sign(whole), kind="stable"))
+    width = fit.stop - fit.start
+    (panels,) = np.nonzero(width)
+    values = np.split(fit.values, first[1:], axis=-1)
     curves = {}
-    for name, fit in fits.items():
-        curves[name] = PanelCurve(fit.values[order], fit.error[order], [])
-        curves[name].poles = _find_panels_at_poles(curves[name], opens[name][order])
-    start = start[order]
-    stop = stop[order]
-    return Panels(start, stop, (stop - start) / (stop - start).sum(), curves)
+    for k, name in enumerate(wanted):
+        sizes = fit.sizes[panels, 1:-1, k]
+        poles = panels[_find_poles(sizes, fit.is_open[panels, k])]
+        curves[name] = PanelCurve(values[k], fit.error[:, k], poles.tolist())
+    return Panels(fit.start, fit.stop, width / width.sum(), curves)
 
 
 def _find_open(
     fit: _Fit,
+    others: list[Array],
     share: Array,
-    usual: float,
-    wanted: Wanted,
+    usual: Array,
+    wanted: Mapping[str, Wanted],
 ) -> NDArray[np.bool_]:
-    """Mark the panels that are halved: for an extreme value, or for the integrals."""
-    most = float(np.fmax.reduce(fit.sizes, axis=None))
-    least = float(np.fmin.reduce(fit.sizes, axis=None))
-    scale = max(abs(most), abs(least))
+    """Mark the panels that are halved, (p, k): for extremes, zeros or integrals.
+
+    `others`: sizes of the panels that are settled.
+    """
+    rounding, *asked = np.array([*wanted.values()]).T
+    integrated, ranged, zeros = np.array(asked, dtype=bool)
+    sizes = np.concatenate([*others, fit.sizes])
+    most: Array = np.fmax.reduce(sizes, axis=(0, 1))
+    least: Array = np.fmin.reduce(sizes, axis=(0, 1))
+    scale = np.maximum(np.abs(most), np.abs(least))
     highest: Array = np.fmax.reduce(fit.sizes, axis=1) + fit.error
     lowest: Array = np.fmin.reduce(fit.sizes, axis=1) - fit.error
-    if wanted.zeros:
-        return (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
-    may_exceed = (highest >= most) | (lowest <= (least if wanted.ranged else -scale))
-    is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + wanted.rounding)
-    if wanted.integrated:
-        is_open |= ~(share * fit.error <= SETTLED * usual + wanted.rounding)
-    return is_open
+    may_vanish = (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
+    may_exceed = (highest >= most) | (lowest <= np.where(ranged, least, -scale))
+    is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + rounding)
+    of_motion = share[:, None] * fit.error
+    is_open |= integrated & ~(of_motion <= SETTLED * usual + rounding)
+    return np.where(zeros, may_vanish, is_open)
 
 
 def split_runs(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
@@ -455,42 +449,49 @@ def split_runs(rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     return np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
 
 
-def _find_panels_at_poles(curve: PanelCurve, unsettled: NDArray[np.bool_]) -> list[int]:
+def _find_poles(sizes: Array, unsettled: NDArray[np.bool_]) -> list[int]:
     """Find the panels that no halving settles and towards which a curve grows.
 
     The panels beside them have two, four and eight times their width. At a jump and in
     noise the values are as large there.
+
+    `sizes`: of the curve at the nodes, (p, NODES).
     """
-    sizes = np.nan_to_num(np.abs(curve.sizes), nan=0.0).max(axis=1)
+    largest = np.nan_to_num(np.abs(sizes)).max(axis=1)
     poles = []
     for run in split_runs(np.flatnonzero(unsettled)):
         beside = [run[0] - _PANELS_BESIDE, run[-1] + _PANELS_BESIDE]
-        away = [sizes[panel] for panel in beside if 0 <= panel < len(sizes)]
-        if away and sizes[run].max() > _GROWTH * max(away):
-            poles.append(int(run[np.argmax(sizes[run])]))
+        away = [largest[panel] for panel in beside if 0 <= panel < len(largest)]
+        if away and largest[run].max() > _GROWTH * max(away):
+            poles.append(int(run[np.argmax(largest[run])]))
     return poles
 
 
-def _fit_panels(compute: ComputeCurves, start: Array, stop: Array) -> dict[str, _Fit]:
+def _fit_panels(
+    compute: ComputeCurves, names: Iterable[str], start: Array, stop: Array
+) -> tuple[_Fit, NDArray[np.intp]]:
     """Fit the polynomials of panels to curves, and estimate their errors.
 
     An error is that of the last two terms, of which one is even and the other odd, or
-    that beside the ends.
+    that beside the ends. The index of the first component of each curve is returned
+    too, (k,).
     """
-    middle = 0.5 * (start + stop)
-    half = 0.5 * (stop - start)
-    places = middle[:, None] + half[:, None] * _EVALUATED
-    fits = {}
-    for name, of_curve in compute(places.ravel()).items():
-        curve = of_curve.reshape(*places.shape, -1)
-        missing = np.asarray(~np.isfinite(curve).all(axis=-1))
-        values = curve[:, 1:-1]
-        last = np.einsum("ij,pjk->pik", _TO_SERIES[-2:], values)
-        checked = np.einsum("ij,pjk->pik", _TO_CHECKED, values)
-        terms = np.abs(last).sum(axis=1)
-        beside = np.abs(checked - curve[:, [0, -1]]).max(axis=1)
-        error = np.maximum(terms, beside).max(axis=-1)
-        error = np.where(missing.any(axis=1), np.inf, error)
-        error[missing.all(axis=1)] = 0.0
-        fits[name] = _Fit(values, error, np.where(missing, np.nan, _measure(curve)))
-    return fits
+    places = start[:, None] + 0.5 * (stop - start)[:, None] * (1.0 + _EVALUATED)
+    found = compute(places.ravel())
+    columns = [found[name].reshape(*places.shape, -1) for name in names]
+    counts = [column.shape[-1] for column in columns]
+    first = np.cumsum([0, *counts[:-1]])
+    curves = np.concatenate(columns, axis=-1)
+    values = curves[:, 1:-1]
+    last = np.einsum("ij,pjc->pic", _TO_SERIES[-2:], values)
+    checked = np.einsum("ij,pjc->pic", _TO_CHECKED, values)
+    terms = np.abs(last).sum(axis=1)
+    beside = np.abs(checked - curves[:, [0, -1]]).max(axis=1)
+    error = np.maximum.reduceat(np.maximum(terms, beside), first, axis=-1)
+    sizes = np.hypot.reduceat(curves, first, axis=-1)
+    missing = ~np.isfinite(sizes)
+    error[missing.any(axis=1)] = np.inf
+    error[missing.all(axis=1)] = 0.0
+    is_open = np.zeros(error.shape, dtype=bool)
+    fit = _Fit(start, stop, values, error, np.where(missing, np.nan, sizes), is_open)
+    return fit, first

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.mobility import TURN, find_intervals
+from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK
 from fourbar.scene.motion import Motion, Sweep
@@ -33,8 +33,8 @@ from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
 
 _INSET = 1e-9
-"""Part of a range that is left out at its limit positions. These may not assemble as
-doubles.
+"""Angle that is left out of a range at its limit positions, rad. These may not assemble
+as doubles.
 """
 _BESIDE = 1e-6
 """Part of the motion from a change point to where a bending moment is read."""
@@ -254,16 +254,7 @@ class Facts:
             ranges = find_stroke_ranges(scene)
             return min(ranges, key=lambda ends: max(ends[0] - stroke, stroke - ends[1]))
         here = float(at.angle[first])
-
-        def find_excess(interval: tuple[float, float]) -> float:
-            start, stop = interval
-            return (here - start) % TURN - (stop - start)
-
-        low, high = min(find_intervals(scene.linkage, at.bar), key=find_excess)
-        width = high - low
-        low = here - (here - low) % TURN if width < TURN else here - 0.5 * TURN
-        high = low + (1.0 - _INSET) * width
-        low += _INSET * width
+        low, high = choose_range(scene.linkage, at.bar, here, _INSET)
         sweep = {f"theta_{at.bar}": Sweep(low, high, _STEPS_OF_RANGE)}
         motion = Motion(**sweep, branch=int(at.branch[first]))  # type: ignore[arg-type]
         whole = solve(replace(scene, motion=motion, tolerances=()), "position")
