@@ -33,7 +33,6 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
     list_couple_notes,
-    list_drawn_notes,
     list_law_notes,
     list_spring_notes,
     list_torsion_notes,
@@ -60,7 +59,6 @@ from fourbar.show.shown_units import (
 )
 from fourbar.show.summary import Facts
 from fourbar.solution import Conversion, Solution
-from fourbar.studies.passing import is_at_limit
 
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
@@ -86,8 +84,6 @@ nine decimals and more.
 """
 _MOST_PLACES = 4
 """Number of places that are listed: of poles, and where dry friction holds a pin."""
-_IN_LINE = 1e-9
-"""Sine below which two bars are in line: places are located to some 1e-12."""
 _NO_ANGLE = 1e-14
 """rad; rounding of an angle of a turn."""
 _NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
@@ -187,25 +183,12 @@ class SceneBlock(Facts):
         ]
 
     def _write_place(self) -> str:
-        """Write what is commanded at the position, and which bar is at a limit there.
-
-        A motion over time has its time written too.
-        """
+        """Write what is commanded at the position, and its time along a motion."""
         one = self.solution
         place = self._value(float(one.at.stated[0][0]), one.at.unit)
         text = f"at {one.commanded} = {place}"
         if one.time is not None:
             text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
-        for bar, pair in BARS_IN_LINE.items():
-            first, second = (one[f"theta_{word}"] for word in pair.split(" and "))
-            theta = f"theta_{bar}"
-            is_limit = is_at_limit(self.scene.linkage, bar, float(one[theta][0]))
-            # at a change point each bar moves on
-            is_alone = bar != one.at.bar and one.status_code[0] == OK
-            sine = math.sin((second - first)[0])
-            if is_limit and is_alone and abs(sine) <= _IN_LINE:
-                bars = f"bars {pair} are {_name_meeting(pair)}"
-                return f"{text}, where {theta} is at a limit: {bars}"
         return text
 
     def _value(
@@ -773,7 +756,6 @@ class SceneBlock(Facts):
                 "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()
-        yield from list_drawn_notes(scene, self.units)
         yield from list_arm_notes(scene)
         yield from list_law_notes(scene, self.units)
         yield from list_spring_notes(scene, solution, self.units)

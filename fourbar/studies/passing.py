@@ -79,12 +79,6 @@ def extend_motion(scene: Scene) -> Scene:
     return replace(scene, motion=motion.replace(angle=sweep))
 
 
-def is_at_limit(linkage: FourBar, bar: int, angle: float) -> bool:
-    """Return True for an angle of a bar that is one of its limits."""
-    nearest = _find_nearest_limit(linkage, bar, angle)
-    return any(abs(beyond) <= SAME_POSITION for beyond, _ in nearest)
-
-
 def meet_limit(linkage: FourBar, bar: int, angle: float, rounding: float) -> float:
     """Return the limit of a bar for an angle beyond it that may be its rounding, rad.
 

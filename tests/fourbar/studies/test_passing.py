@@ -42,7 +42,6 @@ from fourbar.studies.passing import (
     say_nowhere,
 )
 from fourbar_validation.places import MODELS
-from tests.support.block import read_block
 from tests.support.scenes import bare, crank_rocker, find_angle, recommand, thesis
 
 LOCATED = 1e-12
@@ -98,8 +97,6 @@ def test_a_limit_of_the_output_is_one_position(side, beside):
     found = find_positions(scene, "theta_4", theta_1 + pi - at_O4 + beside)
     theta_2 = theta_1 + at_O2 + (0.0 if side > 0.0 else pi)
     assert found.angle == approx([theta_2], abs=AT_LIMIT)
-    told = "deg, where theta_4 is at a limit: bars 2 and 3 are in line"
-    assert told in read_block(solve(scene, at=found))
 
 
 def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
@@ -108,8 +105,6 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     there = solve(scene, at=find_positions(scene, "theta_3", limit))
     between = there.theta_4 - there.theta_2
     assert np.sin(between) == approx([0.0], abs=AT_LIMIT)
-    told = "theta_3 is at a limit: bars 2 and 4 are parallel"
-    assert told in read_block(there)
 
 
 def test_a_commanded_angle_out_of_range_is_refused_with_the_range():
