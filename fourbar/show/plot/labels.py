@@ -1,4 +1,4 @@
-"""Labels next to points, where they cover neither each other nor a line."""
+"""Labels next to points, where they cover neither each other nor what is drawn."""
 
 import cmath
 import math
@@ -6,15 +6,9 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fourbar.show.plot.style import (
-    INK,
-    Points,
-    fit_legends,
-    join_points,
-    split_complex,
-    split_points,
-)
+from fourbar.show.plot.style import INK, fit_legends, split_complex
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,17 +20,17 @@ _NEAR = 10.0
 """Distance of a label's middle from its point until it is settled. This and the other
 distances are in typographic points.
 """
-_REACH = (7.0, 11.0, 16.0, 23.0)
+_REACH = (7.0, 11.0, 16.0, 21.0)
 """Distances from the point to the label's edge that are tried."""
 LABEL_DIRECTIONS = 24
-POINT_DISTANCE = 2.5
-"""Distance of the dots along a line."""
 _MARGIN = 2.5
 """Space around a label: half the width of a bar and a little more."""
-_MARK_WEIGHT, _TEXT_WEIGHT, _HATCH_WEIGHT = 12.0, 30.0, 1.0
-"""Weights of a mark, and of each dot of a text and around a hatching. A dot of a line
-has the line's width.
+_INKED = 200
+"""Level of its darkest channel, of 255, below which a pixel is drawn on. Plates and
+grids are fainter, and may be covered.
 """
+_CUT = 300.0
+"""Cost of a label that leaves its axes, in square points of what it covers."""
 
 
 def add_label(
@@ -70,100 +64,65 @@ def add_label(
 
 
 def settle_labels(figure: "Figure") -> None:
-    """Lay a figure out, and move every label to its nearest free spot."""
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    """Lay a figure out, and move every label to its nearest free spot.
 
-    renderer = FigureCanvasAgg(figure).get_renderer()  # type: ignore[no-untyped-call]
+    The longest have the first choice.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.text import Annotation
+
+    found = figure.findobj(Annotation)
+    labels: list[Any] = [text for text in found if text.get_gid() == _IS_LABEL]
+    for label in labels:
+        label.set_visible(False)
     fit_legends(figure)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
     # labels must not move what they were measured against
     figure.set_layout_engine(None)
-    for axes in figure.findobj(Axes):
-        if any(text.get_gid() == _IS_LABEL for text in axes.texts):
-            _Room(axes, renderer).settle()
+    levels = np.asarray(canvas.buffer_rgba())[::-1, :, :3].min(axis=2)
+    inked = levels < _INKED
+    for label in sorted(labels, key=lambda label: -len(label.get_text())):
+        label.set_visible(True)
+        _place(label, inked, canvas.get_renderer())
 
 
-class _Room:
-    """Axes in pixels, with what is drawn and written there."""
+def _place(label: Any, inked: NDArray[np.bool_], renderer: Any) -> None:
+    """Place a label where it covers least, near and outward, and ink its box.
 
-    def __init__(self, axes: "Axes", renderer: Any) -> None:
-        self.axes = axes
-        self.renderer = renderer
-        self.per_point = float(renderer.points_to_pixels(1.0))
-        """Pixels of a typographic point."""
-        self.dots = np.empty(0, complex)
-        """Points of lines, marks and texts."""
-        self.weights = np.empty(0)
-        """What it costs to cover each of them."""
+    `inked`: True for pixels that are drawn on, from below, (height, width).
+    """
+    per_point = renderer.points_to_pixels(1.0)
+    window = label.axes.bbox
+    point = complex(*label.axes.transData.transform(label.xy))
+    outward = cmath.phase(complex(*label.xyann))
+    extent = label.get_window_extent(renderer)
+    margin = _MARGIN * per_point
+    half = complex(0.5 * extent.width + margin, 0.5 * extent.height + margin)
+    least = math.inf
+    for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
+        # outwards first, then by turns to either side
+        side = 1 if k % 2 else -1
+        turned = (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
+        towards = cmath.rect(1.0, outward + turned)
+        gap = reach * per_point
+        x = towards.real * (gap + half.real)
+        offset = complex(x, towards.imag * (gap + half.imag))
+        low, high = point + offset - half, point + offset + half
+        box = inked[_span(low.imag, high.imag), _span(low.real, high.real)]
+        is_whole = window.contains(*split_complex(low))
+        is_whole &= window.contains(*split_complex(high))
+        cost = box.sum() / per_point**2 + _CUT * (not is_whole)
+        cost += 0.1 * (reach + k)
+        if cost < least:
+            least = cost
+            best = offset, box
+    offset, box = best
+    label.set_ha("center")
+    label.xyann = split_complex(offset / per_point)
+    box[:] = True
 
-    def settle(self) -> None:
-        """Place every label of the axes."""
-        drawn: list[Any] = [*self.axes.lines, *self.axes.patches]
-        for artist in drawn:
-            path = artist.get_transform().transform_path(artist.get_path())
-            if artist.get_linestyle() == "None":
-                self.keep_off(join_points(path.vertices), _MARK_WEIGHT)
-                continue
-            for line in path.cleaned(remove_nans=True).to_polygons(closed_only=False):
-                self.keep_off(
-                    self.sample(line), artist.get_linewidth() or _HATCH_WEIGHT
-                )
-        labels = []
-        for text in self.axes.texts:
-            if text.get_gid() == _IS_LABEL:
-                labels.append(text)
-            else:
-                self.add_box(text.get_window_extent(self.renderer))
-        for label in sorted(labels, key=lambda text: -len(text.get_text())):
-            self.place(label)
 
-    def keep_off(self, dots: Points, weight: float) -> None:
-        """Add points that labels should not cover."""
-        self.dots = np.append(self.dots, dots)
-        self.weights = np.append(self.weights, np.full(len(dots), weight))
-
-    def sample(self, line: Any) -> Points:
-        """Sample dots along a polyline, (n, 2) pixels."""
-        corners = join_points(line)
-        along = np.append(0.0, np.cumsum(np.abs(np.diff(corners))))
-        places = np.arange(0.0, along[-1], POINT_DISTANCE * self.per_point)
-        return np.asarray(np.interp(places, along, corners))
-
-    def add_box(self, box: Any) -> None:
-        """Add the box of a text, which no label should cover."""
-        for height in np.linspace(box.y0, box.y1, 3):
-            row = self.sample([(box.x0, height), (box.x1, height)])
-            self.keep_off(row, _TEXT_WEIGHT)
-
-    def place(self, label: Any) -> None:
-        """Place a label where it covers least, near and outward."""
-        from matplotlib.transforms import Bbox
-
-        point = complex(*self.axes.transData.transform(label.xy))
-        outward = cmath.phase(complex(*label.xyann))
-        extent = label.get_window_extent(self.renderer)
-        margin = _MARGIN * self.per_point
-        half = complex(0.5 * extent.width + margin, 0.5 * extent.height + margin)
-        least = math.inf
-        for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
-            # outwards first, then by turns to either side
-            side = 1 if k % 2 else -1
-            turned = (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
-            towards = cmath.rect(1.0, outward + turned)
-            gap = reach * self.per_point
-            x = towards.real * (gap + half.real)
-            offset = complex(x, towards.imag * (gap + half.imag))
-            apart = self.dots - point - offset
-            covers = (np.abs(apart.real) < half.real) & (np.abs(apart.imag) < half.imag)
-            corners = point + offset - half, point + offset + half
-            box = Bbox(split_points(corners))
-            is_whole = self.axes.bbox.count_contains(box.corners()) == 4
-            cost = float(covers @ self.weights) + 30.0 * (not is_whole)
-            cost += 0.04 * reach + 0.05 * k
-            if cost < least:
-                least = cost
-                best = offset, box
-        offset, box = best
-        label.set_ha("center")
-        label.xyann = split_complex(offset / self.per_point)
-        self.add_box(box)
+def _span(start: float, stop: float) -> slice:
+    """Return the pixels from one place to another."""
+    return slice(max(0, math.floor(start)), max(0, math.ceil(stop)))

@@ -329,7 +329,6 @@ def fit_legends(figure: "Figure") -> None:
     figure.draw_without_rendering()
     dpi = figure.dpi
     figure.set_dpi(PICTURE_DPI)  # on coarser pixels letters are narrower
-    is_changed = False
     for axes in figure.findobj(Axes):
         legend = axes.get_legend()
         if legend is None or legend.get_in_layout():
@@ -339,7 +338,4 @@ def fit_legends(figure: "Figure") -> None:
             place_legend(axes, columns)
             legend = axes.get_legend()
             columns -= 1
-            is_changed = True
     figure.set_dpi(dpi)
-    if is_changed:
-        figure.draw_without_rendering()
