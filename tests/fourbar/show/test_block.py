@@ -38,6 +38,7 @@ from fourbar import (
     units,
 )
 from fourbar.files.scene_file import read_tables
+from fourbar.formulas.mobility import find_intervals
 from fourbar.quantities import PIN_FORCES
 from fourbar.show.block import SceneBlock
 from fourbar.show.plot.figures import draw_figure
@@ -631,6 +632,20 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     low, high = Facts(solve(pushed)).stroke_limits
     assert low == 0.0 and "assembles from 0 mm to" in block(pushed)
     assert bar == 3 or high == approx(0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_cylinder_assembles_over_the_range_that_its_bar_is_in(number):
+    """The rocker has two ranges, which the crank's line mirrors."""
+    low, high = find_intervals(MASSLESS, 4)[number]
+    drive = LinearDrive(Place(1, (0.5, 0.3)), Place(4, (0.1, 0.0)))
+    coarse, fine = (
+        Scene(MASSLESS, Motion(theta_4=Sweep(start, high - 1e-9, steps)), drive=drive)
+        for start, steps in ((0.5 * (low + high), 3), (low + 1e-9, 4000))
+    )
+    stroke = solve(fine).stroke
+    limits = Facts(solve(coarse)).stroke_limits
+    assert limits == approx((stroke.min(), stroke.max()), rel=1e-6)
 
 
 @pytest.mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))

@@ -2,6 +2,7 @@
 
 import time
 import tomllib
+from dataclasses import replace
 from itertools import pairwise
 from math import asin, cos, pi, radians, sin, sqrt, tau
 
@@ -339,6 +340,17 @@ def test_the_angles_of_two_stretches_cover_no_more_than_those_of_one():
         ranges = (facts.angles[bar] for facts in (two, one))
         cover, whole = (high.value - low.value for low, high in ranges)
         assert cover == approx(whole, abs=1e-6)  # a limit leaves the root of rounding
+
+
+def test_angles_have_the_turn_of_the_first_position():
+    """Bar 4 passes 180 deg between that and the first node of the curves."""
+    bars = bare(*CRANK_ROCKER_LENGTHS)
+    (at_start,) = solve(Scene(bars, Motion(1.5))).theta_4
+    turned = pi - 1e-3 - at_start
+    sweep = Sweep(1.5 + turned, 2.5 + turned, 8)
+    scene = Scene(replace(bars, ground_angle=turned), Motion(sweep))
+    low, _ = Facts(solve(scene)).angles[4]
+    assert low.value == approx(pi - 1e-3)
 
 
 @pytest.mark.slow
