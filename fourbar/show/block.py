@@ -53,6 +53,7 @@ from fourbar.show.shown_units import (
     SHOWN_DIGITS,
     choose_unit,
     drop_place_rounding,
+    drop_rounding,
     write_digits,
     write_ends,
     write_short,
@@ -714,24 +715,20 @@ class SceneBlock(Facts):
         peaks = [self.motion.find_peak(name) for name in names]
         sizes = _drop_small([peak and peak.value for peak in peaks])
         places = []
-        for peak, size, name in zip(peaks, sizes, names, strict=True):
-            if peak is None:
-                place = self.motion.panels.list_poles(name)[0]
-            else:
-                place = peak.place
-            is_taken = peak is None or size
-            places.append(self._place(place, named=False) if is_taken else "-")
+        for peak, size, name in zip(peaks, sizes.tolist(), names, strict=True):
+            place = peak.place if peak else self.motion.panels.list_poles(name)[0]
+            places.append(self._place(place, named=False) if size else "-")
         return self._cells(sizes, unit, "unbounded"), places
 
     def _cells(
         self, values: Iterable[float | None], unit: str, missing: str = "-"
     ) -> list[str]:
         """Write quantities of one kind; `missing` stands for none."""
-        values = _drop_small([*values])
-        largest = max((abs(value) for value in values if value), default=0.0)
+        numbers = _drop_small(values)
+        largest = float(np.nanmax(np.abs(numbers), initial=0.0))
         return [
-            missing if value is None else self._value(value, unit, largest)
-            for value in values
+            missing if math.isnan(number) else self._value(number, unit, largest)
+            for number in numbers.tolist()
         ]
 
     def _write_remarks(self) -> Iterator[str]:
@@ -823,11 +820,10 @@ def _row(label: str, text: str) -> str:
     return f"  {label:<{INDENT - 2}}{text}"
 
 
-def _drop_small(values: list[float | None]) -> list[float | None]:
-    """Return zero for what is rounding of the largest of their kind."""
-    largest = max((abs(value) for value in values if value), default=0.0)
-    least = SHOWN_AS_ZERO * largest
-    return [0.0 if value and abs(value) <= least else value for value in values]
+def _drop_small(values: Iterable[float | None]) -> Array:
+    """Return zero for what is rounding of the largest of their kind, NaN for none."""
+    numbers = np.array([*values], dtype=float)
+    return drop_rounding(numbers, np.nanmax(np.abs(numbers), initial=0.0))
 
 
 def _name_meeting(bars: str) -> str:

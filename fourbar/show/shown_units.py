@@ -44,20 +44,8 @@ COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary if no others are asked for. A unit that is left out is the SI unit
 with a prefix.
 """
-_ROTATIONS: dict[str, Conversion] = {
-    "rpm": {"rad/s": COMMON["rad/s"]},
-    "rad/s": {"rad/s": ("rad/s", 1.0), "rad/s^2": ("rad/s^2", 1.0)},
-    "deg/s": {
-        "rad/s": ("deg/s", DEGREES["rad"][1]),
-        "rad/s^2": ("deg/s^2", DEGREES["rad"][1]),
-    },
-}
-"""Units in which rates are shown, by that of omega or alpha as it is stated."""
-_ROTATIONS |= {
-    f"{rate}{square}": {"rad/s^2": _ROTATIONS[rate]["rad/s^2"]}
-    for rate in ("rad/s", "deg/s")
-    for square in ("^2", "²")
-}
+_RATES = {"rpm": COMMON["rad/s"][1], "rad/s": 1.0, "deg/s": DEGREES["rad"][1]}
+"""Units in which rates of bars are shown, with their numbers in a rad/s."""
 PREFIXES = (
     (1e9, "G"),
     (1e6, "M"),
@@ -169,7 +157,13 @@ def _suit_texts(length: str, *rates: str) -> Conversion:
         named = units(name.replace(" ", ".")) if converts(name, "m") else {}
         shown = {**COMMON, **named}
     for text in rates:
-        shown |= _ROTATIONS.get(find_unit(text, ""), {})
+        name = find_unit(text, "")
+        rate = name.removesuffix("^2").removesuffix("²")
+        factor = _RATES.get(rate, 0.0)
+        if factor and rate == name:
+            shown["rad/s"] = rate, factor
+        if factor and rate != "rpm":
+            shown["rad/s^2"] = f"{rate}^2", factor
     return shown
 
 

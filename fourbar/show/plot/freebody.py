@@ -27,7 +27,6 @@ from fourbar.show.plot.style import (
     write_force_name,
     write_labelled_quantity,
     write_pin_name,
-    write_plain,
 )
 from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.shown_units import choose_unit
@@ -43,10 +42,6 @@ LABEL_SPACE = 1.3
 """The window is this much wider than what it shows: space for the labels."""
 STATIONS_DRAWN = 401
 """Stations along a bar."""
-LEAST_DRAWN_FORCE = 0.02
-"""Share of the largest force below which a force is named in the caption only. Its
-arrow would be shorter than its head.
-"""
 
 
 class Arrow(NamedTuple):
@@ -187,7 +182,7 @@ def draw_free_bodies(figure: "SubFigure", view: View) -> None:
     view.note_rest(view.here)
     panels = figure.subplots(1, 3)
     for axes, bar in zip(panels, freed, strict=True):
-        _draw_one(axes, view, bar, scale, biggest)
+        _draw_one(axes, view, bar, scale)
     # one window size: the bars, too, are to one scale
     span = LABEL_SPACE * max(axes.dataLim.size.max() for axes in panels)
     for axes in panels:
@@ -258,29 +253,21 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
         )
 
 
-def _draw_one(
-    axes: "Axes", view: View, freed: FreedBar, scale: float, biggest: float
-) -> None:
+def _draw_one(axes: "Axes", view: View, freed: FreedBar, scale: float) -> None:
     """Draw a bar freed from its pins, with the forces on it, and list its couples."""
     bar = freed.bar
     start, end = freed.pins.values()
     middle = 0.5 * end
     draw_bar(axes, bar, [start, end], alpha=0.45, zorder=2)
     draw_pins(axes, freed.pins, middle, MUTED, 8.0)
-    short: list[str] = []
     for arrow in freed.arrows:
         size = abs(arrow.force)
         text = f"{arrow.text} = {write_labelled_quantity(size, 'N', view.units)}"
-        if size < LEAST_DRAWN_FORCE * biggest:
-            short.append(write_plain(text))
-            continue
         draw_plate(axes, bar, (start, arrow.at, end))
         shaft = scale * arrow.force
         ls = "--" if arrow.dashed else "-"
         draw_arrow(axes, arrow.at, arrow.at + shaft, arrow.colour, ls=ls)
         add_label(axes, text, arrow.at + shaft, shaft, arrow.colour, 7.5)
-    if short:
-        view.note(f"Too short to draw on bar {bar}: {', '.join(short)}.")
     if view.scene.linkage.bar(bar).mass > 0.0:
         draw_plate(axes, bar, (start, freed.G, end))
         draw_mass_centre(axes, bar, freed.G, freed.G - middle, MUTED)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, clean_line, expect, needing
 from fourbar.quantities import Array
-from fourbar.show.shown_units import choose_unit
+from fourbar.show.shown_units import choose_unit, write_short
 from fourbar.solution import Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
 
@@ -261,21 +261,7 @@ def find_peak_index(values: Array) -> int:
     return int(np.argmax(np.where(np.isfinite(values), np.abs(values), -1.0)))
 
 
-RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def write_number(value: float) -> str:
-    """Write three significant digits, never in exponent form where four digits do."""
-    if value == 0.0:
-        return "0"
-    size = math.floor(math.log10(abs(value)))
-    if -3 <= size < 5:
-        text = f"{value:.{max(0, 2 - size)}f}"
-        return text.replace("-", "−")
-    mantissa, exponent = f"{value:.2e}".split("e")
-    return f"{mantissa}·10".replace("-", "−") + str(int(exponent)).translate(
-        RAISED_CHARACTERS
-    )
+_RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, str]:
@@ -287,14 +273,13 @@ def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, s
     power = math.floor(math.log10(factor * largest)) if largest > 0.0 else 0
     if -4 < power < 5:
         return factor, name
-    named = f"10{str(power).translate(RAISED_CHARACTERS)} {name}"
+    named = f"10{str(power).translate(_RAISED_CHARACTERS)} {name}"
     return factor / 10.0**power, named.removesuffix(" 1")
 
 
 def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:
-    """Write a quantity of an SI unit in a unit, or with the prefix that suits it."""
-    factor, name = choose_unit(abs(value), unit, units)
-    return f"{write_number(factor * value)} {name}"
+    """Write three digits of a quantity, in a unit or with the prefix that suits it."""
+    return write_short(value, unit, units, digits=3).replace("-", "−")
 
 
 def set_degree_ticks(axis: Any, span: float) -> None:

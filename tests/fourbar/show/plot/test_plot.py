@@ -465,7 +465,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     (ring,) = (line for line in panel.lines if line.get_marker() == "o")
     assert ring.get_ydata()[0] == approx(peak)
     words = [text.get_text() for text in figure.findobj(Text)]
-    assert f"{style.write_number(peak)} mN m" in words
+    assert f"{peak:.3g} mN m".replace("-", "−") in words
     place = f"{degrees(make_view(scene).here.theta_2[0]):.4g}°"
     assert any(f"Dashed upright line: θ₂\u00a0=\u00a0{place}" in word for word in words)
 
@@ -555,21 +555,6 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     ).axes
     looks = [(line.get_color(), line.get_linestyle()) for line in axes.lines[:-1]]
     assert len(looks) == len({*looks}) == 6
-
-
-@pytest.mark.parametrize(
-    "value, shown",
-    read_rows("""
-0.0 | 0
--1234.6 | −1235
-0.012345 | 0.0123
-3.09312 | 3.09
-2.5e7 | 2.50·10⁷
--3.12e-14 | −3.12·10⁻¹⁴
-"""),
-)
-def test_numbers_have_three_digits(value, shown):
-    assert style.write_number(float(value)) == shown
 
 
 @pytest.mark.parametrize(
