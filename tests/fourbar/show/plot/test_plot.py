@@ -380,7 +380,7 @@ def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, posit
     figure = composed(scene, "bars", position=position)
     words = " ".join(figure.subfigs[0].get_supxlabel().split())
     moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
-    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50.0 mm" in words
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
     assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
 
 
@@ -391,7 +391,7 @@ def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_mome
     figure = composed(fourbar.Scene(linkage, motion, effects=(Gravity(),)), "bars")
     words = " ".join(figure.subfigs[0].get_supxlabel().split())
     moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
-    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50.0 mm" in words
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
     assert "Pin forces grow without bound" in words
 
 
