@@ -73,9 +73,10 @@ _FLAT = 1e-13
 _X, _WEIGHTS = leggauss(NODES)
 _TO_SERIES = np.linalg.inv(legvander(_X, NODES - 1))
 """Matrix from the values at the nodes to the terms of the Legendre series."""
-_BEYOND_NODES = 2.1
-"""Part of their range by which a polynomial may exceed the values at the nodes: half of
-the Lebesgue constant less one.
+_DEGREES = np.arange(1.0, NODES)
+_BEYOND_NODES = 0.25 * np.diff(_X).max() * _DEGREES * (_DEGREES + 1.0)
+"""Amounts by which the terms of a series may exceed the values at the nodes: half the
+largest gap of these, times the steepest slope k (k + 1)/2 of each term.
 """
 _CHECKED = np.array([-1.0, 1.0]) * (1.0 - 2.0 * _BESIDE_END)
 _TO_CHECKED = legvander(_CHECKED, NODES - 1) @ _TO_SERIES
@@ -274,13 +275,13 @@ class Panels:
         scale = np.nanmax(np.abs(sizes))
         best = at_nodes.max(axis=1)
         smooth = curve.error <= HELD * scale
-        spread = np.ptp(sizes, axis=1)
+        terms = np.hypot.reduce(np.abs(curve.series[:, 1:]), axis=-1)
+        most = best + terms @ _BEYOND_NODES[: terms.shape[1]]
         node = np.argmax(at_nodes >= (best - TIED * scale)[:, None], axis=1)
         rows = np.arange(len(best))
-        is_flat = spread <= _FLAT * scale
+        is_flat = terms.sum(axis=1) <= _FLAT * scale
         x = np.where(is_flat, _INSIDE - 1.0, _X[node])
         values = sizes[rows, node]
-        most = best + _BEYOND_NODES * spread
         may_exceed = most >= best.max() - TIED * scale
         for row in np.flatnonzero(may_exceed & smooth & ~is_flat):
             x[row], values[row] = _find_extreme(curve.series[row], rank)
