@@ -8,7 +8,7 @@ the drive (R. L. Norton, Design of Machinery, ch. 11, has them about the mass ce
 Vectors of the plane are complex numbers, x + i y.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -128,11 +128,9 @@ def _list_dynamics(
     forces, residual = _list_forces(scene, motion)
     quantities = _list_rates(motion) | forces
     if any(effect.dry for effect in scene.effects):
-        begins = []
-        for side in (1.0, -1.0):
-            either = command._replace(speed=side, acceleration=0.0)
-            begins.append(_move_bodies(scene.linkage, either, theta))
-        quantities |= _find_range_at_rest(scene, motion, begins)
+        begun = command._replace(speed=1.0, acceleration=0.0)
+        omega = _move_bodies(scene.linkage, begun, theta).omega
+        quantities |= _find_range_at_rest(scene, motion, omega)
     return quantities, residual
 
 
@@ -207,24 +205,25 @@ def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[dict[str, Array], fl
 
 
 def _find_range_at_rest(
-    scene: Scene, motion: BodyMotion, begins: Iterable[BodyMotion]
+    scene: Scene, motion: BodyMotion, omega: dict[int, Array]
 ) -> dict[str, Array]:
     """Find the least and the greatest that the drive takes where the linkage rests.
 
-    `begins`: motions that may begin there.
+    `omega`: of a motion that may begin there, rad/s; its opposite may begin too.
     """
     drive = COUPLE if scene.drive is None else LINE
     ends = []
-    for begun in begins:
-        unknowns, _, _ = balance(scene, motion._replace(beginning=begun.omega))
+    for side in (1.0, -1.0):
+        beginning = {bar: side * rate for bar, rate in omega.items()}
+        unknowns, _, _ = balance(scene, motion._replace(beginning=beginning))
         ends.append(unknowns[:, DRIVE_COLUMN])
     return {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
 
 
 def _place_line_of_drive(scene: Scene, motion: BodyMotion) -> DriveLine | None:
-    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     if scene.drive is None:
         return None
+    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
     return place_line(scene.linkage, scene.drive, theta)
 
 
@@ -242,13 +241,11 @@ def speeds_and_accelerations(
     NaN where the Jacobian is singular.
     """
     d, a, b, c = linkage.lengths
-    n = len(theta_2)
-    u_1 = np.exp(1j * linkage.ground_angle)
-    u_2 = np.exp(1j * theta_2)
-    u_3 = np.exp(1j * theta_3)
-    u_4 = np.exp(1j * theta_4)
+    zero = np.zeros(len(theta_2), dtype=complex)
+    theta = {1: linkage.ground_angle + zero.real, 2: theta_2, 3: theta_3, 4: theta_4}
+    unit = {number: np.exp(1j * angle) for number, angle in theta.items()}
     length = {2: a, 3: b, 4: c}
-    round_ = {2: u_2, 3: u_3, 4: -u_4}  # bar 4 is gone along from B to O4
+    round_ = unit | {4: -unit[4]}  # bar 4 is gone along from B to O4
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
         [stack_components(round_[number]) for number in others],
@@ -258,29 +255,18 @@ def speeds_and_accelerations(
     def rates(stated: Array, centripetal: ComplexArray) -> dict[int, Array]:
         right = stack_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
         solved = solve_system(jacobian, right[..., None])[0][..., 0].T
-        return {bar: stated} | {
-            number: v / length[number] for number, v in zip(others, solved, strict=True)
-        }
+        found = {1: zero.real, bar: stated}
+        for number, v in zip(others, solved, strict=True):
+            found[number] = v / length[number]
+        return found
 
-    zero = np.zeros(n, dtype=complex)
-    omega = {1: np.zeros(n), **rates(speed, zero)}
-    pull = sum(
-        (
-            length[number] * omega[number] ** 2 * round_[number]
-            for number in MOVING_BARS
-        ),
-        zero,
-    )
-    alpha = {1: np.zeros(n), **rates(acceleration, pull)}
-    first_pin = {1: zero, 2: zero, 3: a * u_2, 4: zero + d * u_1}
-    return BodyMotion(
-        linkage,
-        theta_2,
-        {1: zero + u_1, 2: u_2, 3: u_3, 4: u_4},
-        first_pin,
-        omega,
-        alpha,
-    )
+    omega = rates(speed, zero)
+    pull = zero
+    for number in MOVING_BARS:
+        pull = pull + length[number] * omega[number] ** 2 * round_[number]
+    alpha = rates(acceleration, pull)
+    first_pin = {1: zero, 2: zero, 3: a * unit[2], 4: d * unit[1]}
+    return BodyMotion(linkage, theta_2, unit, first_pin, omega, alpha)
 
 
 def balance(
@@ -375,8 +361,7 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
         * 10.0 ** rng.uniform(-3.0, 3.0, (n, 1))
         * rng.uniform(0.0, 1.0, (n, len(k)))
     )
-    many = (np.broadcast_to(F, (n, *F.shape)), np.broadcast_to(C, (n, *C.shape)))
-    x, settled, _ = solve_couples(*many, k, x)
+    x, settled, _ = solve_couples(np.tile(F, (n, 1)), np.tile(C, (n, 1, 1)), k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
         if all(

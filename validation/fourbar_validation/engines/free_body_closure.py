@@ -36,13 +36,17 @@ lengths.
 class Closed(NamedTuple):
     """Positions where the loop closes, the two angles, and the remaining gap, m.
 
-    The angles are NaN elsewhere.
+    Angles and gap are NaN elsewhere.
     """
 
     assembled: NDArray[np.bool_]
     theta: Array
     """Angles of the two bars that are not commanded, rad, (2, n)."""
     gap: Array
+    in_line: Array
+    """Angles from which they are sought, rad, (2, n): where the loop does not close,
+    both bars lie along the diagonal, as at its limits.
+    """
 
 
 def close(
@@ -90,7 +94,7 @@ def close(
     gap[~assembled] = np.nan
     if bar == 4:
         angles = np.array([angles[1] + np.pi, angles[0]])
-    return Closed(assembled, np.angle(np.exp(1j * angles)), gap)
+    return Closed(assembled, np.angle(np.exp(1j * angles)), gap, start)
 
 
 def _compute_angle_between(e: Array, near: float, far: float) -> Array:

@@ -4,6 +4,7 @@ A table leads from its kind to its wrench. Definitions as in docs/scene-file.md,
 the numbers of the description alone. Vectors of the plane are complex numbers, x + i y.
 """
 
+import cmath
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -61,14 +62,11 @@ class BodyMotion(NamedTuple):
         slip = self.slip(pin)
         if self.beginning is None:
             return np.sign(slip)
-        i, j = PINS[pin]
-        begins = self.beginning[j] - self.beginning[i]
-        begins[
-            np.abs(begins)
-            < _TURNS_AS_ONE * (np.abs(self.beginning[j]) + np.abs(self.beginning[i]))
-        ] = 0.0
-        at_rest = np.logical_and.reduce([self.omega[bar] == 0.0 for bar in MOVING_BARS])
-        return np.where(at_rest, np.sign(begins), np.sign(slip))
+        of_i, of_j = (self.beginning[bar] for bar in PINS[pin])
+        begins = of_j - of_i
+        as_one = np.abs(begins) < _TURNS_AS_ONE * (np.abs(of_j) + np.abs(of_i))
+        moves = np.any([self.omega[bar] for bar in MOVING_BARS], axis=0)
+        return np.sign(np.where(moves, slip, np.where(as_one, 0.0, begins)))
 
 
 _TURNS_AS_ONE = 64.0 * 2.0**-52
@@ -118,8 +116,7 @@ FOLLOWED = np.radians(2.0)
 
 def make_vector(pair: Any) -> complex:
     """Return (distance, angle) as a vector."""
-    length, angle = pair
-    return complex(length * np.cos(angle), length * np.sin(angle))
+    return cmath.rect(*pair)
 
 
 def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
@@ -238,10 +235,8 @@ def has_wrench(effect: Any) -> bool:
 
 def apply_effect(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
     """Add what an effect does to the free bodies."""
-    if effect.key in WRENCH_OF:
-        WRENCH_OF[effect.key](effect, motion, wrenches)
-    else:
-        effect.act_on_free_bodies(motion, wrenches)
+    act = WRENCH_OF.get(effect.key, type(effect).act_on_free_bodies)
+    act(effect, motion, wrenches)
 
 
 def sum_acting(scene: Scene, motion: BodyMotion) -> BodyWrenches:
@@ -305,26 +300,17 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     on_path = np.isin(begins.theta_2, path[closed.assembled])
     if not on_path.any():
         return gone
-    d, a, b, c = link.lengths
-    to_O4 = d * np.exp(1j * link.ground_angle) - a * np.exp(1j * path)
-    folded = np.abs(to_O4) < abs(b - c)
-    theta = {1: np.full(len(path), link.ground_angle), 2: path}
-    for bar, turned in ((3, folded & (b < c)), (4, ~folded | (b < c))):
-        in_line = np.angle(to_O4) + np.pi * turned
-        followed = np.where(closed.assembled, closed.theta[bar - 3], in_line)
-        theta[bar] = np.unwrap(followed)
+    followed = np.where(closed.assembled, closed.theta, closed.in_line)
+    theta_3, theta_4 = np.unwrap(followed)
+    theta = {1: link.ground_angle + 0.0 * path, 2: path, 3: theta_3, 4: theta_4}
     start = begins.theta_2[on_path][0]
     first = int(np.searchsorted(path, start))
     places = np.clip(np.searchsorted(path, motion.theta_2), 0, len(path) - 1)
     for pin, _, rest, _ in springs:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
-        gone |= (
-            np.abs(
-                away[places] - 2.0 * np.pi * np.floor(away[first] / (2.0 * np.pi) + 0.5)
-            )
-            > GREATEST_WINDING
-        )
+        turns = np.floor(away[first] / math.tau + 0.5)
+        gone |= np.abs(away[places] - math.tau * turns) > GREATEST_WINDING
     return gone
 
 

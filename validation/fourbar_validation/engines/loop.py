@@ -253,7 +253,8 @@ class Exact:
         out, assembled, gap = read_each(bars, command, names, read)
         if reason := bars.refusal():
             return Answer(self.name, "exact", refusal=reason)
-        _unwrap_angles(out, assembled)
+        for name in ANGLES:  # continuous along the sweep
+            out[name][assembled] = np.unwrap(out[name][assembled])
         return Answer(
             self.name,
             "exact",
@@ -265,12 +266,6 @@ class Exact:
             own=bars.own,
             seconds=time.perf_counter() - start,
         )
-
-
-def _unwrap_angles(values: dict[str, Array], assembled: NDArray[np.bool_]) -> None:
-    """Make the angles of bars 3 and 4 continuous along the sweep, in place."""
-    for name in ANGLES:
-        values[name][assembled] = np.unwrap(values[name][assembled])
 
 
 Read = Callable[[JointAngles, float, float], dict[str, Any]]

@@ -42,9 +42,6 @@ NO_RATES = np.zeros(3)
 """Speeds or accelerations of the coordinates, where they are zero."""
 BEARERS = {2: (2,), 3: (3, 2), 4: (4,)}
 """Bars whose first pins carry what acts on a bar of the open tree."""
-_OMEGAS, _ALPHAS = (
-    tuple(f"{name}_{bar}" for bar in MOVING_BARS) for name in ("omega", "alpha")
-)
 
 
 class Tree(Loaded, Protocol):
@@ -61,8 +58,6 @@ class Tree(Loaded, Protocol):
     )
     turns: Mapping[int, Array]
     """Derivatives of the bars' rotations by the coordinates, in the plane constant."""
-    rows: Array
-    """Derivatives of the rotations of bars 2, 3, 4 as rows, (3, 3)."""
     v: Array
     a: Array
     at: Mapping[str, Array]
@@ -79,7 +74,6 @@ class Tree(Loaded, Protocol):
         self.alone = bool(scene.loads or scene.effects)
         self.place((0.0, 0.0, 0.0))
         self.turns = {1: np.zeros(3)} | {bar: self.turn(bar) for bar in MOVING_BARS}
-        self.rows = np.stack([self.turns[bar] for bar in MOVING_BARS])
 
     # methods that the engine defines
     def point_jacobian(self, name: str) -> Array:
@@ -210,9 +204,9 @@ class Tree(Loaded, Protocol):
         values: BarValues = dict(
             zip(_ACCELERATIONS, self.accelerations(ON_BARS.values()), strict=True)
         )
-        # of three numbers `@` takes twice as long as `dot`
-        values |= zip(_OMEGAS, self.rows.dot(v).tolist(), strict=True)
-        values |= zip(_ALPHAS, self.rows.dot(a).tolist(), strict=True)
+        for moving in MOVING_BARS:
+            values[f"omega_{moving}"] = self.velocity(moving)
+            values[f"alpha_{moving}"] = self.alpha(moving)
         solve = partial(solve_multipliers, jacobian, self.drive_column())
 
         def balanced() -> dict[str, Any]:
