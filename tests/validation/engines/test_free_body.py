@@ -72,6 +72,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         "collections",
         "dataclasses",
         "itertools",
+        "cmath",
         "math",
         "typing",
         *(
