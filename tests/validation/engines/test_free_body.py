@@ -8,7 +8,7 @@ import pytest
 from pytest import approx
 
 import fourbar
-from fourbar.effects import Gravity, Load, Place, Spring, Springs, Torsion
+from fourbar.effects import Friction, Gravity, Load, Place, Spring, Springs, Torsion
 from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
@@ -35,13 +35,13 @@ def answered(scene):
     return answer.quantities
 
 
-@pytest.mark.parametrize("pin", ["O2", "O4"])
-def test_a_spring_is_wound_along_the_assembly_through_change_points(pin):
+@pytest.mark.parametrize("pin, begin", [("O4", 0.3), ("O2", 0.3 + 3.0 * math.tau)])
+def test_a_spring_is_wound_along_the_assembly_through_change_points(pin, begin):
     """Of a parallelogram bars 2 and 4 turn together: each winds by what bar 2 turns.
 
     Also where all positions have one sign, and change points lie between them.
     """
-    rest, begin = 0.1, 0.3
+    rest = 0.1
     for turned in (np.linspace(0.0, 2.0 * math.tau, 25), math.tau * np.arange(3)):
         scene = Scene(
             RECTANGLE,
@@ -49,9 +49,9 @@ def test_a_spring_is_wound_along_the_assembly_through_change_points(pin):
             effects=(Torsion(((pin, 2.0, rest, 0.0),)),),
         )
         torque = ask_at(FreeBody(), scene, command(scene)).quantities["torque"]
-        wound = begin + turned - rest > math.pi
+        wound = 0.2 + turned > math.pi
         np.testing.assert_array_equal(np.isnan(torque), wound)
-        due = 2.0 * (begin + turned - rest)[~wound]
+        due = 2.0 * (0.2 + turned)[~wound]
         np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
 
 
@@ -85,6 +85,15 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         modules = imported(Path(module.__file__))
         assert modules
         assert not [name for name in modules if not name.startswith(allowed)]
+
+
+def test_at_rest_the_drive_takes_what_either_beginning_asks():
+    """Bars 2 and 4 of a rectangle begin to turn together, and bar 3 not at all."""
+    friction = Friction.at(O2=0.1, A=0.2, B=0.3, O4=0.4)
+    scene = Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), effects=(friction,))
+    got = answered(scene)
+    ends = got["torque_low"][0], got["torque"][0], got["torque_high"][0]
+    assert ends == approx((-1.0, 0.0, 1.0), abs=1e-14)
 
 
 NOTHING, LEFT, RIGHT = (0.0, 0.0), (-10.0, 0.0), (10.0, 0.0)
