@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Friction, Viscous
+from fourbar.effects import Friction, PinFriction, Viscous
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NAMES, PINS, copy_with
 from fourbar.quantities import UNITS, VECTORS, Array
@@ -229,17 +229,21 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
         return
     scene = state_all(judge.scene)
     at = drop_remainder(judge.at)
+    jumps = any(isinstance(one, Friction | PinFriction) for one in scene.effects)
     for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
-        fitted = _fit(columns, family, right)
+        fitted = _fit(columns, family, right, jumps)
         for numbers in () if fitted is None else (np.round(fitted), fitted):
             if np.abs(numbers).max() > LEAST_NUMBER:
                 yield family.make(*numbers.tolist())._replace(times=CARRIED)
 
 
-def _fit(columns: list[JudgedColumn], family: _Family, here: Array) -> Array | None:
+def _fit(
+    columns: list[JudgedColumn], family: _Family, here: Array, jumps: bool
+) -> Array | None:
     """Fit the numbers of a family; None if no others fit better than its first.
 
     `here`: residual at these, which is that of the right numbers if they are ours.
+    `jumps`: whether friction may reverse, so that slopes are looked at on both sides.
     """
     numbers = np.array(family.start)
 
@@ -251,7 +255,10 @@ def _fit(columns: list[JudgedColumn], family: _Family, here: Array) -> Array | N
     for step in range(NEWTON):
         slopes = []
         for shift in FIT_STEP * np.eye(len(numbers)):
-            less, more = measure(numbers + shift), measure(numbers - shift)
+            less = measure(numbers + shift)
+            more = 2.0 * here - less
+            if jumps or step > 0:
+                more = measure(numbers - shift)
             # a number that jumps beside the position, as friction does, has no slope
             smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
             slopes.append(np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP))
