@@ -41,6 +41,7 @@ from fourbar_validation.report.html import (
     write_html,
     write_summary_page,
 )
+from fourbar_validation.report.overview import DRIVES
 from fourbar_validation.report.run_summary import PICTURED, Summary
 from fourbar_validation.report.scene_pictures import (
     STRETCHES,
@@ -551,7 +552,7 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     """Only engines that declare few errors are independent."""
     overview = Summary()
     overview.declared = {"one": 1e-14, "two": declared}
-    overview.listed = {"two": dict.fromkeys(["friction", "gravity", "torque", "F12"])}
+    overview.listed = {"two": dict.fromkeys(["friction", "gravity", *DRIVES, "F12"])}
     for name, counts in (("a", (5, 5)), ("b", (5, 4)), ("c", (5, 0))):
         rows = [
             mine(scene=name, engine=engine, quantity=quantity)
@@ -560,7 +561,7 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
         ]
         overview.add(replace(record_of(name, rows), needs=["gravity"]))
     needs = ["friction"]  # inertia alone is asked without it
-    bare = mine(scene="d", engine="two", quantity="torque_inertia")
+    bare = mine(scene="d", engine="two", quantity="drive_force_inertia")
     overview.add(replace(record_of("d", [bare]), needs=needs))
     assert "two lists friction: compared in no scene" in overview.notes
     assert overview.checked_twice == confirmed

@@ -12,7 +12,9 @@ import pytest
 from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, uniform
 from fourbar.scene import Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.rows import DEGRADED, FAILS, UNDECIDED
+from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
+from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.pinocchio import PinocchioReleased
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
@@ -206,6 +208,18 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
         lambda released: replace(released, theta_2=released.theta_2 + next(shifts)),
     )
     assert row(rows, "pinocchio-forward", "theta_2").verdict == verdict
+
+
+@pytest.mark.parametrize("declared, verdict", [(1e-3, AGREES), (1e-5, FAILS)])
+def test_a_guest_may_err_in_a_released_motion_by_what_it_declares(declared, verdict):
+    """One of adaptive steps errs alike whatever step it is given."""
+    motion = Motion(1.0, 0.0, free=Free(0.1, 5))
+    question = make_question("falling", replace(falling(), motion=motion), ENGINES)
+    moved = question.solution.theta_2 + 3e-5, question.solution.omega_2
+    answer = ReleasedAnswer("adaptive", "", *moved, np.zeros(6), np.ones(6))
+    tolerance = replace(EQUIVALENCE, factor=declared, reason="as it says")
+    rows = free._make_rows(question, answer, answer, tolerance)
+    assert row(rows, "adaptive", "theta_2").verdict == verdict
 
 
 @pytest.mark.slow

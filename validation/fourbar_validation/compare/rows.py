@@ -387,7 +387,7 @@ class Counts:
             return self.sentence()
         hold = f"All {self.compared} comparisons{self._write_where()} hold"
         if self[DEGRADED]:
-            hold += f"; {self[DEGRADED]} of them at hard positions, as predicted"
+            hold += f"; {self[DEGRADED]} of them with larger errors, as predicted"
         return hold
 
     def sentence(self) -> str:

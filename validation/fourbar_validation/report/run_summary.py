@@ -203,8 +203,9 @@ class Summary:
         if row.reason.startswith(EQUIVALENCE.cause) and math.isfinite(row.error):
             k = row.error * row.condition / EPS
             self.measured_k[row.engine] = max(self.measured_k.get(row.engine, 0.0), k)
-        if row.compared and row.quantity == name_whole(row):
-            for name in (row.quantity, *needs):
+        if row.compared:
+            whole = name_whole(row)
+            for name in (whole, *(needs if row.quantity == whole else ())):
                 self.listed.get(row.engine, {}).pop(name, None)
 
     def _add_agreement(self, rows: Sequence[Row]) -> None:

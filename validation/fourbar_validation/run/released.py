@@ -34,6 +34,7 @@ from fourbar_validation.compare.scales import make_reference
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
     TIMES_PREDICTED,
+    ErrorBound,
     divide,
     replace_zero_size,
 )
@@ -89,7 +90,9 @@ def check_released(question: Question) -> Iterator[Row]:
     times = np.linspace(0.0, free.duration, free.steps + 1)
     yield from _compare_forces(question)
 
-    def rows(start: Callable[[float], Any], longest: float) -> list[Row]:
+    def rows(
+        start: Callable[[float], Any], longest: float, tolerance: ErrorBound
+    ) -> list[Row]:
         interval = free.duration / free.steps
         # two of them, or more, from one instant to the next
         step = interval / (2.0 * math.ceil(interval / (2.0 * longest) - 1e-6))
@@ -102,18 +105,18 @@ def check_released(question: Question) -> Iterator[Row]:
             question.leave_out(fine.engine, fine.refusal)
             return [Row.unmeasured(*who, "all", REFUSES, fine.refusal)]
         coarse = start(2.0 * step).release(scene, times)
-        return _make_rows(question, fine, coarse)
+        return _make_rows(question, fine, coarse, tolerance)
 
     for engine in question.engines:
         if isinstance(engine, Guest) and "release" in engine.effects:
-            yield from question.attempt(
-                partial(rows, engine.at_step, LONGEST_OF_A_GUEST), engine.name
-            )
+            judge = partial(rows, engine.at_step, LONGEST_OF_A_GUEST, engine.tolerance)
+            yield from question.attempt(judge, engine.name)
     for adapter, (start, library) in FORWARD.items():
         if reason := find_missing(library):
             question.leave_out(adapter, reason)
         else:
-            yield from question.attempt(partial(rows, start, LONGEST_TIMESTEP), adapter)
+            judge = partial(rows, start, LONGEST_TIMESTEP, EQUIVALENCE)
+            yield from question.attempt(judge, adapter)
 
 
 def _compare_forces(question: Question) -> Iterator[Row]:
@@ -251,8 +254,12 @@ def _make_rows(
     question: Question,
     fine: ReleasedAnswer,
     coarse: ReleasedAnswer,
+    tolerance: ErrorBound,
 ) -> list[Row]:
-    """Judge the motion by that of the formulas, and by that of twice the step."""
+    """Judge the motion by that of the formulas, and by that of twice the step.
+
+    An engine may err by as much as it declares.
+    """
     free = question.scene.motion.free
     omega_2 = question.solution.omega_2
     assert free is not None and omega_2 is not None
@@ -280,8 +287,10 @@ def _make_rows(
             expected = float(divide(np.abs(values[:n] - other[:n]).max(), size))
         full = RELEASED_ERRORS[name]
         full *= max(1.0, free.duration / DURATION_OF_FULL_ACCURACY)
-        allowed = max(full, TIMES_PREDICTED * expected)
         reason = f"a free motion of {free.duration:g} s"
+        if tolerance.factor > full:
+            full, reason = tolerance.factor, tolerance.reason
+        allowed = max(full, TIMES_PREDICTED * expected)
         row = Row.judged(who, name, error, allowed, reason, fine.theta_2[:n])
         if not row.error <= full:
             reason = f"{row.error:.1e} where {expected:.1e} was predicted"
