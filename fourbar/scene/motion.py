@@ -576,15 +576,16 @@ class Motion(Described):
         if not self.has_rate_of_each or np.array_equal(places, self.angle):
             return rates
         rows = dict(zip(self.angle.tolist(), range(len(self.angle)), strict=True))
-        chosen: Any = [*map(rows.get, places.tolist())]
+        chosen: Any = [*map(rows.get, places.ravel().tolist())]
         if None in chosen:
             raise InputError(
                 f"motion.{self.names[1 if isinstance(self.speed, np.ndarray) else 2]}",
                 f"{len(self.angle)} numbers",
                 "are those of the stated positions: no other has one",
             )
+        index = np.array(chosen, dtype=int).reshape(places.shape)
         speed, acceleration = (
-            rate[chosen] if isinstance(rate, np.ndarray) else rate for rate in rates
+            rate[index] if isinstance(rate, np.ndarray) else rate for rate in rates
         )
         return speed, acceleration
 

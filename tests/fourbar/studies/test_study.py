@@ -164,6 +164,12 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
         assert_array_equal(out["a_G3"][member], single.a_G3)
 
 
+def test_listed_angles_keep_their_rates_in_every_member():
+    listed = replace(scene(), motion=Motion([1.0, 2.0], [1.0, 3.0]))
+    study = solve(vary(listed, {"lengths.input": [0.1, 0.12]}), "velocity")
+    assert study.omega_2.tolist() == [[1.0, 3.0], [1.0, 3.0]]
+
+
 def test_a_bad_member_has_a_status_and_disturbs_no_other():
     plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
     values = {
