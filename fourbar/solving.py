@@ -322,7 +322,8 @@ def _require_command_at(at: Command) -> None:
     for name, value in stated.items():
         if value is None and name in ("time", omega):
             continue
-        numbers = np.asarray(value)
+        is_number = isinstance(value, np.ndarray | np.number | float | int)
+        numbers = np.asarray(value if is_number else None)
         is_for_each = isinstance(value, np.ndarray) and numbers.shape == each
         is_one_rate = name in (omega, alpha) and not numbers.shape
         if numbers.dtype.kind not in "iuf" or not (is_for_each or is_one_rate):

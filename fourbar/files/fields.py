@@ -34,7 +34,6 @@ from fourbar.linkage import (
     Entries,
     Listed,
     OfBar,
-    OneOf,
     Part,
     list_declared,
 )
@@ -266,13 +265,10 @@ class Entry:
         name = self.value.get("point")
         of_bar = self["bar"]
         if name is not None:
-            if name not in [*bars] and (not bars or name in [*PINS]):
-                raise self["point"].refuse(
-                    "must be a point of [points]; the first pin of a bar is "
-                    'from_pin = ["0 m", "0 deg"], the second has its length in place of'
-                    " 0"
-                )
-            self["point"].check(OneOf((*bars,)))
+            if name not in [*bars]:
+                known = ", ".join(bars) or "none"
+                allowed = f"must be a point of [points], which has {known}"
+                raise self["point"].refuse(allowed)
             if of_bar.value is None:
                 of_bar.value = bars[name]
         bar = of_bar.check(OfBar(allowed_bars))

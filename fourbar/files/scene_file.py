@@ -93,33 +93,21 @@ LONGEST_SHOWN_LINE = 60
 """Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
 """Limit of the loads, each of which is a term at every position."""
-SCENE_TABLES = (
-    "title",
-    "source",
-    "lengths",
-    "pins",
-    "bars",
-    "motion",
-    "drive",
-    "points",
-    "loads",
-    "effects",
-    "tolerances",
-    "picture",
-)
-_LEFT_OUT: dict[str, Any] = {
+_TABLES: dict[str, Any] = {
     "title": "",
     "source": "",
-    "loads": [],
     "lengths": {},
+    "pins": None,
     "bars": {},
     "motion": {},
     "drive": {},
     "points": {},
+    "loads": [],
     "effects": {},
     "tolerances": {},
+    "picture": None,
 }
-"""What stands for the tables that a file leaves out."""
+"""Entries of a file, and what stands for those that it leaves out."""
 _A_GIVEN_DRIVE = (
     "a drive is what is solved for; a torque or force that is given is a load"
     " ([[loads]]), which moves the linkage with motion.free"
@@ -129,7 +117,6 @@ _OVER_THETA_2 = (
     " time that moves the linkage is for a simulator (fourbar mjcf SCENE --drive motor)"
 )
 _LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
-_A_LINE = "a drive along a line has from and to alone"
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS_OF_A_SCENE = 1000
 """Limit of the points, each of which is three columns of every table."""
@@ -208,10 +195,10 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
 
 def read_scene(document: Entry, folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
-    document.table(SCENE_TABLES)
+    document.table(_TABLES)
     drawing = read_drawing(document)
     drawn = drawing or read_ground(document["lengths"])
-    top = document.holding(_LEFT_OUT | document.value)
+    top = document.holding(_TABLES | document.value)
     top.file.drawing = drawn
     points = _read_points(top["points"])
     top.file.bars = {point.name: point.bar for point in points}
@@ -277,23 +264,18 @@ def _read_drive(drive: Entry) -> tuple[int | None, ForceDrive | None]:
         for name in ("torque", "moment", "force"):
             if name in drive.value:
                 raise drive[name].refuse(_A_GIVEN_DRIVE)
-    on_line = list_keys(LinearDrive)
-    allowed = dict.fromkeys(("bar", *on_line, *list_keys(PointDrive)))
-    stated = drive.table(allowed).keys()
-    kind: Any = PointDrive
-    if not stated.isdisjoint(on_line):
-        kind = LinearDrive
-        for name in stated:
-            if name not in on_line:
-                raise drive[name].refuse(_A_LINE)
-    elif not stated:
+    of_line = list_keys(LinearDrive)
+    stated = drive.table(dict.fromkeys(("bar", *of_line, *list_keys(PointDrive))))
+    if not stated:
         return 2, None
-    elif stated == {"bar"}:
-        return drive["bar"].check(OfBar()), None
-    elif stated.isdisjoint(PLACES_OF_ENDS):
-        drive["bar"].check(OfBar())
+    if not stated.keys().isdisjoint(of_line):
+        return None, drive.described(LinearDrive)
+    if stated.keys().isdisjoint(PLACES_OF_ENDS):
+        bar = drive["bar"].check(OfBar())
+        if len(stated) == 1:
+            return bar, None
         raise drive["point"].refuse(_A_POINT)
-    return None, drive.described(kind)
+    return None, drive.described(PointDrive)
 
 
 def _read_points(points: Entry) -> tuple[Point, ...]:
@@ -446,8 +428,6 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
             raise tolerance.refuse(f"must be like {form}")
         width = tolerance.holding(stated[0] if sigma else stated)
         size = width.check(Declared(unit, POSITIVE))
-        if size <= 0.0:
-            raise width.refuse("must be > 0")
         read = Tolerance(key, size, sigma)
         if (misfit := find_misfit(scene, entries[key], read)) is not None:
             raise width.refuse(misfit)

@@ -16,8 +16,6 @@ from fourbar.effects import list_kinds
 from fourbar.errors import InputError, expect
 from fourbar.files.drawn_pins import choose_assembly, meet_lengths
 from fourbar.files.fields import (
-    Entry,
-    SceneFile,
     write_described,
     write_quantity,
 )
@@ -25,12 +23,9 @@ from fourbar.linkage import (
     BAR_NAMES,
     MOVING_BARS,
     Bar,
-    Described,
-    FourBar,
 )
 from fourbar.quantities.units import IMPERIAL, find_unit, to_si
 from fourbar.scene import Scene
-from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
     BRANCH_NAMES,
     FromLimit,
@@ -170,25 +165,19 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 
 
 def _write_motion(motion: Motion) -> dict[str, Any]:
-    theta, omega, alpha = motion.names
-    acceleration: Any = motion.acceleration
-    if motion.law is not None:  # whose angles have theirs
-        acceleration = None
-    entry = {
-        theta: motion.angle,
-        omega: motion.speed,
-        alpha: acceleration,
-        "law": motion.law,
-        "branch": BRANCH_NAMES[motion.branch],
-        "side": motion.side,
-        "free": motion.free,
-    }
-    stated = {name: value for name, value in entry.items() if value is not None}
-    for name, value in stated.items():
-        if name in motion.numbers:
-            stated[name] = _write_commanded(value, motion.numbers[name].unit)
-        elif isinstance(value, Described):
-            stated[name] = write_described(value)
+    stated: dict[str, Any] = {}
+    if motion.law is not None:
+        stated["law"] = write_described(motion.law)
+    else:
+        for name in motion.names:
+            value = getattr(motion, name)
+            if value is not None:
+                stated[name] = _write_commanded(value, motion.numbers[name].unit)
+    stated["branch"] = BRANCH_NAMES[motion.branch]
+    if motion.side is not None:
+        stated["side"] = motion.side
+    if motion.free is not None:
+        stated["free"] = write_described(motion.free)
     return stated
 
 
@@ -257,18 +246,12 @@ def write_new_scene(
 
     Raises InputError for what is no length, and for bars that cannot close.
     """
-    texts = [" ".join(text.split()) for text in lengths]
-    stated = dict(zip(BAR_NAMES.values(), texts, strict=True))
-    read = Entry(SceneFile("--lengths"), "", stated)
-    numbers = read.numbers(dict.fromkeys(stated, Bar.numbers["length"]))
-    d, *moving = numbers.values()
-    a, b, c = map(Bar, moving)
-    FourBar(d, a, b, c)
     rows = ["[lengths]"]
-    rows += (f"{name} = {_quote(text)}" for name, text in stated.items())
+    for name, text in zip(BAR_NAMES.values(), lengths, strict=True):
+        rows.append(f"{name} = {_quote(text)}")
     rows.append('ground_angle = "0 deg"  # from O2 to O4')
-    unit = find_unit(texts[0], "m")
-    return _fill_in(rows, moving, _BRANCH_LINE, unit, template)
+    unit = find_unit(lengths[0], "m")
+    return _fill_in(rows, "--lengths", _BRANCH_LINE, unit, template)
 
 
 _BRANCH_LINE = '# branch = "crossed"  # left out: open\n'
@@ -285,10 +268,7 @@ def write_drawn_scene(
     rows = ["[pins]  # x and y in the position that is drawn"]
     for pin, (x, y) in pins.items():
         rows.append(f"{pin} = [{_quote(x)}, {_quote(y)}]")
-    stated = {pin: [*place] for pin, place in pins.items()}
-    drawing = Entry(SceneFile("--pins"), "pins", stated).described(DrawnPins)
-    moving = [*map(drawing.length, MOVING_BARS)]
-    return _fill_in(rows, moving, "", find_unit(pins["A"][0], "m"), template)
+    return _fill_in(rows, "--pins", "", find_unit(pins["A"][0], "m"), template)
 
 
 def _quote(text: str) -> str:
@@ -296,6 +276,7 @@ def _quote(text: str) -> str:
 
     The mark of inches would end the text: 12" becomes "12 in".
     """
+    text = " ".join(text.split())
     inches = re.fullmatch(r"([^'′’]*\d)\s*[\"”″]", text)
     return json.dumps(f"{inches[1]} in" if inches else text, ensure_ascii=False)
 
@@ -330,22 +311,29 @@ _IMPERIAL_EXAMPLES = {
 
 def _fill_in(
     rows: list[str],
-    moving: list[float],
+    option: str,
     branch: str,
     unit: str,
     template: str,
 ) -> str:
     """Fill in the template of a new scene file; each bar weighs 1 kg/m or 0.05 lb/in.
 
-    `unit`: of its lengths; imperial ones have comments in such units.
+    Parameters
+    ----------
+    rows : of the linkage.
+    option : of the command that states them, for errors.
+    unit : of its lengths; imperial ones have comments in such units.
     """
+    from fourbar.files.scene_file import loads  # which imports this module
+
+    linkage = loads("\n".join(rows), option).linkage
     examples = _EXAMPLES
     if unit.casefold() in IMPERIAL:
         examples = _IMPERIAL_EXAMPLES
     per_metre = float(examples["per_length"]) / to_si(f"1 {examples['long']}", "m")
     masses = {
-        name: repr(float(f"{per_metre * length:.4g}"))
-        for name, length in zip(MOVING_BAR_NUMBERS, moving, strict=True)
+        name: repr(float(f"{per_metre * linkage.bar(number).length:.4g}"))
+        for name, number in MOVING_BAR_NUMBERS.items()
     }
     # loads much that no other command needs
     from importlib.resources import files

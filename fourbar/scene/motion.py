@@ -619,7 +619,7 @@ def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array
     if array.ndim == 0:
         return float(array)
     listed = len(angle) if isinstance(angle, np.ndarray) else 0
-    if len(array) != listed:
+    if not listed or len(array) != listed:
         allowed = f"must be one number, or one for each listed position: {listed}"
         raise InputError(key, f"{len(array)} numbers", allowed)
     array.flags.writeable = False

@@ -592,7 +592,7 @@ plot @crank_rocker.toml -o a.svg --figure pie | figure = 'pie': must be one of
 mjcf @crank_rocker.toml -o a.xml --axis '0 0 0' | axis = (0.0, 0.0, 0.0): must
 new --lengths 3 1 2 2 | name the new file once
 new a.toml --lengths 300 100 250 220 | --unit mm
-new a.toml --lengths 3m 1m 2m 0m | error: --lengths: output = '0m': must be a
+new a.toml --lengths 3m 1m 2m 0m | error: --lengths: lengths.output = '0m': must be a
 classify 30cm 100 250 220 | unit
 
 # no reader of the form takes a file of that name

@@ -17,7 +17,7 @@ places | point = "P"\n | point = "P"\nbar = 4\n | P is on bar 3
 places | arm = | from_pin = ["1 mm", "0 deg"]\narm = | from_pin states the place already
 places | Q = { bar = 1, from_pin | Q = { bar = 1, from_centre | the ground has no mass
 places | arm = | frame = "bar"\narm = | loads[2].arm
-line | [drive] | [drive]\nbar = 4 | drive.bar = 4: a drive along a line has from and to
+line | [drive] | [drive]\nbar = 4 | drive.bar = 4: unknown key; must be among from, to
 line | to = { bar = 4, from_pin = ["9 cm", "0 deg"] } | | drive.to
 line | to = { bar = 4 | to = { bar = 1 | drive.to.bar = 1: must be another bar
 line | "21 cm", "-60 deg" | "30 cm", "0 deg" | does no work at any position
@@ -26,7 +26,7 @@ line | [drive] | [drive]\nforce = 1 | drive.force
 point | direction = "90 deg"\n | | drive.direction
 point | point = "handle"\n | bar = 2\n | drive.point
 point | point = "handle"\n | point = "hand"\n | drive.point = 'hand'
-point | point = "handle"\n | from = { bar = 1 }\npoint = "handle"\n | from and to
+point | point = "handle"\n | from = { bar = 1 }\npoint = "handle"\n | drive.point = 'handle'
 point | point = "handle"\n | bar = 1\nfrom_pin = ["1 m", "0 deg"]\n | drive.bar
 point | frame = "bar"\n[[ | frame = "body"\n[[ | drive.frame
 point | point = "handle"\n | at = ["1 m", "0 deg"]\nbar = 2\n | drive.at

@@ -191,6 +191,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     read_rows("""
 {"theta_2": [1, 2], "omega_2": [1]} | one for each listed position: 2
 {"theta_2": [1, 2], "alpha_2": [1, 1, 1]} | one for each listed position: 2
+{"theta_2": 1, "omega_2": []} | one for each listed position: 0
 {"theta_2": 1, "omega_2": [1]} | one for each listed position: 0
 {"theta_2": [1, 2], "omega_2": [1, 1e200]} | must be below
 {"theta_2": [1, 2], "omega_2": [1, NaN]} | must be finite
