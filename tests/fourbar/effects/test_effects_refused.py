@@ -26,7 +26,7 @@ line | [drive] | [drive]\nforce = 1 | drive.force
 point | direction = "90 deg"\n | | drive.direction
 point | point = "handle"\n | bar = 2\n | drive.point
 point | point = "handle"\n | point = "hand"\n | drive.point = 'hand'
-point | point = "handle"\n | from = { bar = 1 }\npoint = "handle"\n | drive.point = 'handle'
+point | point = "handle"\n | from = { bar = 1 }\npoint = "handle"\n | drive.point
 point | point = "handle"\n | bar = 1\nfrom_pin = ["1 m", "0 deg"]\n | drive.bar
 point | frame = "bar"\n[[ | frame = "body"\n[[ | drive.frame
 point | point = "handle"\n | at = ["1 m", "0 deg"]\nbar = 2\n | drive.at

@@ -191,3 +191,10 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     bar = scene.linkage.input
     per_length = 0.05 * 0.45359237 / 0.0254 if "lb" in units else 1.0
     assert bar.mass == approx(per_length * bar.length)
+
+
+def test_a_release_is_written_and_new_bars_weigh_by_their_lengths():
+    scene = loads(scene_text.write_new_scene(("300  mm", "100 mm", "250 mm", "220 mm")))
+    assert [bar.mass for bar in scene.linkage.moving] == [0.1, 0.25, 0.22]
+    released = replace(scene, motion=Motion(1.0, free=Free(1.0, 4)))
+    assert loads(dump(released)) == released
