@@ -157,31 +157,19 @@ def price(
     same file without it.
     """
     before = _collect_errors(unchanged)
-    after = _collect_errors(rows)
-    if is_setting(difference.key):
-        # one that lowers some errors and raises others alike changes nothing
-        before = _keep_worst(before, after)
-        after = {key: error for key, error in after.items() if key in before}
-    gains = [
-        (error - before.get(key, 0.0), key[1])
-        for key, error in after.items()
-        if math.isfinite(before.get(key, 0.0))
-    ]
+    gains = []
+    for (engine, quantity), error in _collect_errors(rows).items():
+        earlier = before.get((engine, quantity), 0.0)
+        if is_setting(difference.key):
+            # one that lowers some errors and raises others alike changes nothing
+            others = (one for (other, _), one in before.items() if other == engine)
+            earlier = max(others, default=math.nan)
+        if math.isfinite(earlier):
+            gains.append((error - earlier, quantity))
     if not gains:
         return difference
     cost, quantity = max(gains)
     return replace(difference, cost=max(cost, 0.0), quantity=quantity)
-
-
-def _keep_worst(before: _Errors, after: _Errors) -> _Errors:
-    """Return the worst error before, by method, at the quantity that is worst after."""
-    worst = {}
-    for engine in {engine for engine, _ in after}:
-        keys = [key for key in after if key[0] == engine]
-        errors = [error for key, error in before.items() if key[0] == engine]
-        if errors:
-            worst[max(keys, key=after.__getitem__)] = max(errors)
-    return worst
 
 
 def _collect_errors(rows: Sequence[Row]) -> _Errors:

@@ -13,11 +13,7 @@ import click
 import numpy as np
 
 from fourbar.errors import write_count
-from fourbar.formulas.mobility import (
-    change_points,
-    find_intervals,
-    turns_fully,
-)
+from fourbar.formulas.mobility import change_points, find_limit_angles
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import command
 from fourbar.writing import write_text
@@ -298,13 +294,18 @@ def _describe_limit(loop: LoopMeasurement, angle: float) -> str:
     scene = loop.scene
     linkage = scene.linkage
     bar = command(scene).bar
-    in_line = "where the bars are in line and the constraint is nearly singular"
-    places = [(at, f"a change point, {in_line}") for at in change_points(linkage, bar)]
-    if not turns_fully(linkage, bar):
-        limits = [end for ends in find_intervals(linkage, bar) for end in ends]
-        open_beyond = "beyond which the loop does not close"
-        places += [(limit, f"a limit position, {open_beyond}") for limit in limits]
-    near = [(abs(math.remainder(angle - at, math.tau)), kind) for at, kind in places]
+    places = dict.fromkeys(
+        find_limit_angles(linkage, bar),
+        "a limit position, beyond which the loop does not close",
+    )
+    places |= dict.fromkeys(
+        change_points(linkage, bar),
+        "a change point, where the bars are in line and the constraint is nearly"
+        " singular",
+    )
+    near = [
+        (abs(math.remainder(angle - at, math.tau)), kind) for at, kind in places.items()
+    ]
     distance, kind = min(near, default=(math.inf, ""))
     if distance > NEAR_A_LIMIT:
         return ""

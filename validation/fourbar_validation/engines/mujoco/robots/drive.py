@@ -65,34 +65,32 @@ class LoopDrive:
             loads[ground, 3:] = -frame.normal
             return loads
 
-        def locate(place: Place) -> tuple[int, Array, complex]:
-            """Return body and place in world axes, (3,), m, and its bar's direction."""
+        def locate(place: Place) -> tuple[int, Array]:
+            """Return the body of a place, and the place in world axes, (3,), m."""
             line = frame.line(place.bar)
-            unit = line / abs(line)
             pin = frame.locate(place.bar, FIRST_PIN[place.bar])
-            body, *_ = self.loop.bodies[place.bar]
-            return body, pin + frame.to_world(unit * complex(place.in_bar)), unit
+            arm = frame.to_world(line / abs(line) * complex(place.in_bar))
+            return self.loop.bodies[place.bar][0], pin + arm
 
         if isinstance(self.drive, PointDrive):
-            body, start, unit = locate(self.drive.place)
-            direction = cmath.rect(1.0, self.drive.direction)
+            second, end = locate(self.drive.place)
+            first = ground
+            start = end
+            direction = self.drive.direction
             if self.drive.frame == "bar":
-                direction *= unit
-            force = frame.to_world(direction)
-            pushed = ((body, start, force), (ground, start, -force))
+                direction += frame.angle(self.drive.place.bar)
+            line = frame.to_world(cmath.rect(1.0, direction))
+        elif self.cylinder is not None:
+            start, end = data.site_xpos[self.cylinder.sites]
+            first, second = self.model.site_bodyid[self.cylinder.sites].tolist()
+            line = end - start
         else:
-            if self.cylinder is not None:
-                start, end = data.site_xpos[self.cylinder.sites]
-                first, second = self.model.site_bodyid[self.cylinder.sites].tolist()
-                line = end - start
-            else:
-                assert isinstance(self.drive, LinearDrive)
-                first, start, _ = locate(self.drive.start)
-                second, end, _ = locate(self.drive.end)
-                line = frame.in_plane(end - start) @ frame.axes
-            force = line / np.linalg.norm(line)
-            pushed = ((first, start, -force), (second, end, force))
-        for body, point, one in pushed:
+            assert isinstance(self.drive, LinearDrive)
+            first, start = locate(self.drive.start)
+            second, end = locate(self.drive.end)
+            line = frame.in_plane(end - start) @ frame.axes
+        force = line / np.linalg.norm(line)
+        for body, point, one in ((first, start, -force), (second, end, force)):
             arm = point - data.xipos[body]
             loads[body] += [*one, *np.cross(arm, one)]
         return loads

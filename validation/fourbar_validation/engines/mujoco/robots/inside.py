@@ -686,7 +686,6 @@ class LoopInside:
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, model.opt.timestep)
-        answer.seconds_per_step = math.inf
         rows: list[Any] = []
         doubtful: list[Any] = []  # they may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far

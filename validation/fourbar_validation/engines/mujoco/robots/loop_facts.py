@@ -377,7 +377,7 @@ def find_scales(
         cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
         vanishes = well.any() and cancels[well].all()
         scale = terms if vanishes else sizes[name]
-        scales[name] = float(scale.max())
+        scales[name] = float(scale.max(initial=0.0))
     return scales
 
 
@@ -422,7 +422,7 @@ class InsideAnswer:
     """Position of the driven joint from which on the simulated loop is in the other
     assembly, rad: no state counts from there on.
     """
-    seconds_per_step: float = math.nan
+    seconds_per_step: float = math.inf
     """Processor time of a step of the whole robot between two states, the least, s."""
 
     def errors(self) -> dict[str, Array]:

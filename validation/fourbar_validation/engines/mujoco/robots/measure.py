@@ -22,8 +22,8 @@ from fourbar.linkage import FIRST_PIN
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.document import Drive
 from fourbar.quantities import OK, Array
-from fourbar.scene import Scene, command
-from fourbar.scene.motion import BRANCH_NAMES, Motion
+from fourbar.scene import Scene, command, find_signs
+from fourbar.scene.motion import CROSSED, OPEN, Motion
 from fourbar.show.panels import split_runs
 from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import wrap_difference
@@ -60,10 +60,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     thin_out,
     varies,
 )
-from fourbar_validation.engines.mujoco.robots.loop_scene import (
-    make_loop_scene,
-    miss_output,
-)
+from fourbar_validation.engines.mujoco.robots.loop_scene import make_loop_scene
 from fourbar_validation.engines.mujoco.robots.onto_scene import (
     LoopOfScene,
     find_loop_of_scene,
@@ -112,8 +109,7 @@ def measure_loops(
     notes = [*found[0].robot.notes]
     if file.kind != "MJCF" and options.error is not None:
         notes.append(SETTINGS_OF_AN_SDF)
-    notes += [f"MuJoCo warns: {warning}" for warning in warnings]
-    return RobotMeasurement(measured, tuple(notes))
+    return RobotMeasurement(measured, (*notes, *warnings))
 
 
 def _find_loops(file: RobotFile, options: MeasureOptions) -> Iterator[LoopOfScene]:
@@ -375,15 +371,11 @@ def _generate(scene: Scene) -> RobotFile:
         closed = np.flatnonzero(solution.status_code == OK)
         if not len(closed):
             raise LimitError("the scene's loop closes at none of its positions")
-        first = closed[0]
         moving = (solution.theta_2, solution.theta_3, solution.theta_4)
-        angles = [float(np.asarray(theta)[first]) for theta in moving]
-        at_rest = [
-            replace(scene, motion=Motion(angles[0], branch=branch))
-            for branch in BRANCH_NAMES
-        ]
-        pose = [scene.linkage.ground_angle, *angles]
-        scene = min(at_rest, key=lambda one: miss_output(one, pose))
+        theta_2, theta_3, theta_4 = np.array(moving)[:, closed[:1]]
+        sign = np.where(np.sin(theta_4 - theta_3) > 0.0, OPEN, CROSSED)
+        (branch,) = find_signs(scene.linkage, theta_2, sign).tolist()
+        scene = replace(scene, motion=Motion(float(theta_2[0]), branch=branch))
         drive = "none"
     return RobotFile(GENERATED, write_mjcf(scene, drive=drive))
 
@@ -405,8 +397,7 @@ def examine_file(
         if joint in measured.unmet_stops:
             key = f"pins.{pin}.range"
             described[key] = described[key]._replace(value=UNLIMITED_RANGE)
-    notes = [*found.robot.notes, *found.parts]
-    notes += [f"MuJoCo warns: {warning}" for warning in warnings]
+    notes = [*found.robot.notes, *found.parts, *warnings]
     return Examined(described, measured, notes)
 
 
@@ -418,27 +409,16 @@ def examine_mended(
     None stands for an entry that cannot be set, or if time is up.
     """
     found = find_loop_of_scene(file, scene, options)
-
-    def measure(change: tuple[str, Value | None]) -> LoopMeasurement | None:
-        seen = found.see().with_model()
-        if not mend_entry(seen, *change):
-            return None
-        return measure_loop(found, options, seen.model, briefly=True)
-
-    return list(_take_in_time(map(measure, changes), len(changes)))
-
-
-def _take_in_time(
-    answers: Iterator[LoopMeasurement | None], count: int
-) -> Iterator[LoopMeasurement | None]:
-    """Yield answers, None for each that is not begun within PRICING."""
     end = time.process_time() + PRICING
-    for _ in range(count):
-        answer = None
-        if time.process_time() < end:
+    measured = []
+    for key, value in changes:
+        seen = found.see()
+        one = None
+        if time.process_time() < end and mend_entry(seen, key, value):
             with collect_warnings():
-                answer = next(answers)
-        yield answer
+                one = measure_loop(found, options, seen.model, briefly=True)
+        measured.append(one)
+    return measured
 
 
 def predict_softness(
@@ -472,10 +452,10 @@ def _answer_at_yield(found: LoopOfScene, times: float) -> tuple[Any, Any]:
     """Return torque and pin forces of single states at a multiple of the least yield,
     and the motion of the bars through time; nothing where it is not simulated.
     """
-    seen = found.see().with_model()
+    model = found.see().model
     impedance = 1.0 / (1.0 + times * (1.0 / STIFFEST - 1.0))
-    seen.model.eq_solimp[[*found.loop.closures], :2] = impedance
-    inside, motion = put_loop_inside(found, seen.model)
+    model.eq_solimp[[*found.loop.closures], :2] = impedance
+    inside, motion = put_loop_inside(found, model)
     states = inside.answer_states(motion)
     through = InsideAnswer()
     with suppress(LimitError):

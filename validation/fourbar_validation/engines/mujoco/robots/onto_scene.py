@@ -8,6 +8,7 @@ closure is then closed onto the assembly of the scene.
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from xml.etree import ElementTree as ET
 
@@ -98,9 +99,9 @@ class LoopOfScene:
     """
 
     def see(self) -> SeenLoop:
-        """Return the loop as its entries are described."""
+        """Return the loop as its entries are described, in a model of its own."""
         bar = command(self.scene).bar
-        return SeenLoop(self.robot.model, self.loop, bar)
+        return SeenLoop(copy(self.robot.model), self.loop, bar)
 
 
 def find_loop_of_scene(

@@ -64,15 +64,16 @@ class CompiledRobot:
 
 @contextmanager
 def collect_warnings() -> Iterator[list[str]]:
-    """Collect the warnings of MuJoCo, each once.
+    """Collect the warnings of MuJoCo as notes, each once.
 
     MuJoCo then neither prints nor logs them.
     """
     heard: list[str] = []
 
     def hear(warning: str) -> None:
-        if warning not in heard:
-            heard.append(warning)
+        note = f"MuJoCo warns: {warning}"
+        if note not in heard:
+            heard.append(note)
 
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(hear)

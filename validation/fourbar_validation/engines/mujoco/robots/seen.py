@@ -2,7 +2,6 @@
 
 import cmath
 import math
-from copy import copy
 from typing import NamedTuple
 
 import mujoco
@@ -122,11 +121,6 @@ class SeenLoop(LoopFrame):
         self.sense = loop.senses
         self.closure = loop.equality
         self._bars = list_bars(model, loop)
-
-    def with_model(self) -> "SeenLoop":
-        """Return the same loop in a model of its own, which may be changed."""
-        model = copy(self.model)
-        return SeenLoop(model, self.loop, self.commanded)
 
     @property
     def plane(self) -> str:

@@ -8,11 +8,11 @@ keeps the torque and the pin forces within the wanted error.
 import math
 import time
 from collections import ChainMap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from copy import copy
 from functools import partial
-from itertools import chain, compress, product
+from itertools import chain, compress, islice, product
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -35,7 +35,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     RobotLoop,
     SettingsAdvice,
     TriedSettings,
-    WorstState,
     make_motion,
     thin_out,
 )
@@ -157,22 +156,21 @@ class SettingsSearch:
 
     def _answer(
         self, changes: Mapping[str, str], motion: Array, wanted: float = math.inf
-    ) -> list[InsideAnswer]:
+    ) -> tuple[InsideAnswer, InsideAnswer]:
         """Return the answers at single states and through time.
 
-        One that takes too many steps is left out, as are those after it, and so are all
-        where the settings tear the loop. Settings are not simulated whose single states
-        are not within an error.
+        One that takes too many steps is empty, and so are both where the settings tear
+        the loop. Settings are not simulated whose single states are not within an
+        error.
         """
         given = self.inside
         inside = given.with_model(set_settings(given.given, given.loop, changes))
-        answers = []
+        states = through = InsideAnswer()
         with suppress(LimitError):
             states = inside.answer_states(motion)
-            answers.append(states)
             if states.find_worst(states.scales(inside.lever)).error <= wanted:
-                answers.append(inside.answer_through_time(motion))
-        return answers
+                through = inside.answer_through_time(motion)
+        return states, through
 
     def find_range(
         self, changes: Mapping[str, str], wanted: float
@@ -182,33 +180,31 @@ class SettingsSearch:
         Ranges are proposed by the states of the whole motion, each error over the
         scale of its range, and then measured by themselves.
         """
-        answers = self._answer(changes, self.whole)
-        if len(answers) < 2 or answers[1].lost:
+        states, through = self._answer(changes, self.whole)
+        if through.lost or not len(through.rows):
             return None
-        places = np.unique(answers[0].rows.angle).tolist()
+
+        def fits(angles: list[float]) -> bool:
+            """Tell whether the states of a range are within the error."""
+            low, *_, high = angles
+            parts = [
+                InsideAnswer(rows[(low <= rows.angle) & (rows.angle <= high)])
+                for rows in (states.rows, through.rows)
+            ]
+            scales = parts[0].scales(self.inside.lever)
+            return all(one.find_worst(scales).error <= wanted for one in parts)
+
+        places = np.unique(states.rows.angle).tolist()
         ranges = (
             places[first : first + count]
             for count in range(len(places), 2, -1)
             for first in range(len(places) - count + 1)
         )
-        tried = 0
-        for inside in ranges:
-            low = inside[0]
-            high = inside[-1]
-            states, through = (
-                InsideAnswer(rows[(low <= rows.angle) & (rows.angle <= high)])
-                for rows in (one.rows for one in answers)
-            )
-            if tried == RANGES_TRIED:
-                return None
-            scales = states.scales(self.inside.lever)
-            if max(one.find_worst(scales) for one in (states, through)).error > wanted:
-                continue
-            tried += 1
-            motion = make_motion(inside, self.whole[0, 1:])
+        for angles in islice(filter(fits, ranges), RANGES_TRIED):
+            motion = make_motion(angles, self.whole[0, 1:])
             search = SettingsSearch(self.inside, motion)
             if search.measure(changes).error <= wanted:
-                at_ends = np.isin(states.rows.angle, (low, high))
+                at_ends = np.isin(states.rows.angle, (angles[0], angles[-1]))
                 ends = states.rows.joint[at_ends].tolist()
                 return min(ends), max(ends)
         return None
@@ -225,19 +221,17 @@ class SettingsSearch:
             math.isfinite(known.seconds_per_step) or known.states.error > wanted
         ):
             return known
-        states = through = WorstState(math.inf)
-        gap = seconds = math.inf
-        answers = self._answer(changes, self.motion, wanted)
-        if answers:
-            scales = answers[0].scales(self.inside.lever)
-            states = answers[0].find_worst(scales)
-        if len(answers) == 2:
-            answer = answers[1]
-            through = answer.find_worst(scales)
-            seconds = answer.seconds_per_step
-            gap = float(answer.rows.gap.max()) if len(answer.rows) else math.inf
-        cost = seconds / float({**self.own, **changes}["timestep"])
-        measured = TriedSettings(changes, states, through, gap, seconds, cost)
+        states, through = self._answer(changes, self.motion, wanted)
+        scales = states.scales(self.inside.lever)
+        seconds = through.seconds_per_step
+        measured = TriedSettings(
+            changes,
+            states.find_worst(scales),
+            through.find_worst(scales),
+            max(through.rows.gap.tolist(), default=math.inf),
+            seconds,
+            seconds / float({**self.own, **changes}["timestep"]),
+        )
         self.tried[frozenset(changes.items())] = measured
         return measured
 
@@ -309,13 +303,16 @@ class SettingsSearch:
         """Write the elements of the file that change, with their new values."""
         loop = self.inside.loop
         model = self.inside.given
-        closure, friction = (
-            {name: changes[name] for name in names if name in changes}
-            for names in (_OF_CLOSURES, _OF_FRICTION)
-        )
-        option = {name: changes[name] for name in _OPTIONS if name in changes}
-        written: list[tuple[str, dict[str, str], dict[str, str]]]
-        written = [("option", {}, option)]
+
+        def write(
+            tag: str, own: Mapping[str, str], names: Iterable[str]
+        ) -> Iterator[str]:
+            """Write an element with what changes of some attributes, if anything."""
+            changed = {name: changes[name] for name in names if name in changes}
+            if changed:
+                yield ET.tostring(ET.Element(tag, {**own, **changed}), "unicode")
+
+        yield from write("option", {}, _OPTIONS)
         root = ET.fromstring(file.text)
         elements = root.findall(".//equality/*")
         equalities = [one for one in elements if one.tag != "equality"]
@@ -323,7 +320,7 @@ class SettingsSearch:
             # that of a URDF is no element of it
             one = equalities[number] if equalities else ET.Element("connect")
             own = one.attrib if file.kind == "MJCF" else {}
-            written.append((one.tag, own, closure))
+            yield from write(one.tag, own, _OF_CLOSURES)
         joints = [
             one.attrib
             for one in root.findall(".//worldbody//*")
@@ -336,8 +333,4 @@ class SettingsSearch:
         for number in model.dof_jntid[self.rubbing].tolist():
             name = name_joint(model, number)
             own = joints[number] if in_order else stated.get(name, {"name": name})
-            written.append(("joint", own, friction))
-        for tag, own, changed in written:
-            if changed:
-                element = ET.Element(tag, own | changed)
-                yield ET.tostring(element, encoding="unicode")
+            yield from write("joint", own, _OF_FRICTION)
