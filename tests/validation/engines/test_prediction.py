@@ -211,3 +211,14 @@ def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
     engine = next(engine for engine in ENGINES if engine.name == "free-body")
     answer = FreeBody().answer(driven, command)
     assert make_prediction(engine, driven, command, answer) is not None
+
+
+def test_a_motion_is_predicted_under_pin_friction_and_its_forces_are_not():
+    friction = fourbar.PinFriction.at(O4=(0.15, 0.006))
+    scene = crank_rocker(effects=(friction,))
+    at = fourbar.command(scene)
+    (engine,) = [one for one in ENGINES if one.name == "free-body"]
+    predict = make_prediction(engine, scene, at, engine.adapter().answer(scene, at))
+    everywhere = np.ones(len(at.angle), dtype=bool)
+    assert np.isfinite(predict("alpha_4", everywhere)).any()
+    assert predict("F14", everywhere) is predict("torque", everywhere) is None
