@@ -218,7 +218,7 @@ def test_a_motion_is_predicted_under_pin_friction_and_its_forces_are_not():
     scene = crank_rocker(effects=(friction,))
     at = fourbar.command(scene)
     (engine,) = [one for one in ENGINES if one.name == "free-body"]
-    predict = make_prediction(engine, scene, at, engine.adapter().answer(scene, at))
+    predict = make_prediction(engine, scene, at, engine.start().answer(scene, at))
     everywhere = np.ones(len(at.angle), dtype=bool)
     assert np.isfinite(predict("alpha_4", everywhere)).any()
     assert predict("F14", everywhere) is predict("torque", everywhere) is None
