@@ -65,6 +65,8 @@ def require(key: str, value: object, unit: str = "1", bound: str = ANY_NUMBER) -
     wanted = f"must be {bound}, like {_show(unit)}"
     if unit != "1":
         value = _read_quantity(value)
+    elif isinstance(value, str):
+        wanted += ", without quotes"
     if unit != "1" and isinstance(value, str):
         from fourbar.quantities.units import UnitError, to_si
 

@@ -150,9 +150,11 @@ class Entry:
         for number, unit in zip(numbers, cycle(getattr(by, "units", ["1"]))):
             if unit != "1" and isinstance(number, self.UNSTATED):
                 raise self.holding(number).refuse(self.FORM.format(name_unit(unit)))
-        if value == DRAWN_WORD:
+        if DRAWN_WORD in numbers:
             name = self.key.removeprefix("motion.").partition(".")[0]
-            value = self.file.drawn.get(name, value)
+            drawn = self.file.drawn.get(name, DRAWN_WORD)
+            numbers = [drawn if one == DRAWN_WORD else one for one in numbers]
+            value = numbers if isinstance(value, list) else drawn
         try:
             return by.check(self.key, value)
         except InputError as error:

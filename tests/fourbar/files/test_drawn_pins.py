@@ -103,6 +103,8 @@ def test_places_of_the_drawing_are_where_they_are_drawn():
     centre = '[bars.coupler]\nmass = "1 kg"\ncentre = { drawn = ["100 mm", "70 mm"] }\n'
     text = f'{pins}{centre}[motion]\ntheta_2 = "drawn"\n[points]\n{rows}\n'
     scene = loads(text)
+    listed = loads(text.replace('"drawn"', '["1 rad", "drawn"]')).motion.theta_2
+    assert listed.tolist() == [1.0, scene.motion.theta_2]
     table = solve(scene).to_pandas()
     for bar, place in places.items():
         shown = [table[f"P{bar}_{axis}"][0] * 1e3 for axis in "xy"]

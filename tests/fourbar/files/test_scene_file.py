@@ -121,6 +121,7 @@ branch = "open" | free = { steps = 3 } | motion.free.duration | missing
 from_pin = ["5 cm", "0 deg"] | point = "B" | loads[0].point = 'B' | a point of [points]
 [drive]\nbar = 2 | [drive]\nbar = 1 | drive.bar | must be 2 (input), 3 (coupler) or 4
 force = ["3 N", "40 deg"]\nfrom_pin | moment = "1 N m"\narm | .arm | needs a force
+viscous = { | pin_friction.A.coefficient = "0.1"\nviscous = { | like 1, without quotes
 ["9.81 m/s^2", "-90 deg"] | "9.81 m/s^2" | like gravity = ["9.81 m/s^2", "-90 deg"]
 """)
 """What is replaced, by what, and words that the line must hold."""
