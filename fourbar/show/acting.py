@@ -13,7 +13,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
 from fourbar.quantities import CHANGE_POINT, WOUND, Array
 from fourbar.scene import Command, Scene, command
-from fourbar.scene.motion import FEWEST_POINTS, Law
+from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
@@ -66,6 +66,32 @@ def list_arm_notes(scene: Scene) -> list[str]:
         if load.arm is not None
         and scene.linkage.bar(load.bar).mass == 0.0
         and scene.linkage.bar(load.bar).centre is None
+    ]
+
+
+def list_drawn_notes(scene: Scene, units: Conversion) -> list[str]:
+    """Say where a sweep to or from the drawn angle goes by more than half a turn.
+
+    The direction of a drawn bar leaves open which of its angles was meant.
+    """
+    sweep = scene.motion.angle
+    if scene.drawing is None or not isinstance(sweep, Sweep):
+        return []
+    drawn = scene.drawing.angle(scene.motion.bar)
+    if drawn not in (sweep.start, sweep.stop):
+        return []
+    key, other = ("to", sweep.stop) if drawn == sweep.start else ("from", sweep.start)
+    away = math.remainder(other - drawn, TURN)
+    width = abs(other - drawn)
+    if width - abs(away) < SAME_POSITION or abs(away) < SAME_POSITION:
+        return []
+    swept, start, stop, nearer, gap = (
+        write_short(angle, "rad", units)
+        for angle in (width, sweep.start, sweep.stop, drawn + away, abs(away))
+    )
+    return [
+        f"{scene.motion.commanded} goes by {swept} from {start} to {stop}; {key} ="
+        f' "{nearer}" is the same direction, {gap} from the drawn one'
     ]
 
 

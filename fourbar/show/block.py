@@ -33,6 +33,7 @@ from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import (
     list_arm_notes,
     list_couple_notes,
+    list_drawn_notes,
     list_law_notes,
     list_spring_notes,
     list_torsion_notes,
@@ -753,6 +754,7 @@ class SceneBlock(Facts):
                 "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()
+        yield from list_drawn_notes(scene, self.units)
         yield from list_arm_notes(scene)
         yield from list_law_notes(scene, self.units)
         yield from list_spring_notes(scene, solution, self.units)

@@ -2,7 +2,7 @@
 
 import json
 import re
-from math import acos, asin, cos, degrees, pi, radians, sin, sqrt, tau
+from math import acos, asin, cos, degrees, pi, radians, sin, sqrt, tan, tau
 
 import pytest
 
@@ -19,9 +19,10 @@ from fourbar import (
     solve,
 )
 from fourbar.files import loads
-from fourbar.show.acting import list_spring_notes
+from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.solution import DEGREES
 from tests.support.block import read_block
+from tests.support.rows import read_rows
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare
 
 HATCH = """
@@ -189,6 +190,39 @@ def test_every_form_of_what_is_printed_tells_it(tmp_path, show):
     file.write_text(load(f"bar = 4\n{FORCE}\n{ARM}"), encoding="utf-8")
     for option in ("--columns=theta_2,torque", "--table", "--json"):
         assert "arm counts from G of bar 4" in show("analyze", file, option)
+
+
+DRAWN = """
+[pins]
+O2 = ["0 mm", "0 mm"]
+A = ["-98 mm", "ACROSS mm"]
+B = ["-450 mm", "200 mm"]
+O4 = ["-300 mm", "0 mm"]
+[motion]
+theta_2 = { from = "FROM", to = "TO", steps = 4 }
+omega_2 = "1 rad/s"
+[bars.input]
+mass = "1 kg"
+"""
+
+
+LONG_WAYS = read_rows("""
+drawn | -170 deg | to = "190 deg" is the same direction, 20 deg from
+-170 deg | drawn | from = "190 deg" is the same direction, 20 deg from
+drawn | 190 deg |
+drawn | 530 deg |
+169.9 deg | -170 deg |
+""")
+
+
+@pytest.mark.parametrize("start, stop, told", LONG_WAYS)
+def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
+    """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
+    text = DRAWN.replace("FROM", start).replace("TO", stop)
+    across = 98.0 * tan(radians(10.0))
+    scene = loads(text.replace("ACROSS", repr(across)))
+    (note,) = list_drawn_notes(scene, DEGREES) or [""]
+    assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
 MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
