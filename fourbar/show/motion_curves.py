@@ -125,10 +125,10 @@ class MotionCurves:
         names = [drive.keys.value, "power", "speed", *PIN_FORCES]
         peaks = [peak.place for name in names if (peak := self.find_peak(name))]
         away = _BESIDE_A_BREAK * panels.length
-        found = [peaks, self.breaks - away, self.breaks + away]
-        places = np.unique(np.concatenate([self.solution.at.places, *found]))
-        ends = np.sort(self.solution.at.places[[0, -1]])
-        places = places[(places >= ends[0]) & (places <= ends[1])]
+        stated = self.solution.at.places
+        found = np.concatenate([peaks, self.breaks - away, self.breaks + away])
+        found = found[(found >= stated.min()) & (found <= stated.max())]
+        places = np.union1d(stated, found)
         if panels.start[0] > panels.stop[-1]:
             places = places[::-1]
         return self.solve_at(places)

@@ -302,16 +302,12 @@ class Facts:
         pairs = [(solution.force_error, np.max([*loads.values()], axis=0))]
         if drive is not None and drive.error is not None:
             pairs.append((drive.error, drive.sizes))
-        largest = None
+        relative: list[float] = []
         for error, size in pairs:
-            solved = (
-                np.isfinite(error) & np.isfinite(size) & (solution.status_code == OK)
-            )
+            solved = np.isfinite(error + size) & (solution.status_code == OK)
             usual = np.median(size[solved]) if solved.any() else 0.0
             reference = np.maximum(size, usual)
             # where most are exactly zero, so may be one with an error bar
             solved &= reference > 0.0
-            if solved.any():
-                relative = float((error[solved] / reference[solved]).max())
-                largest = relative if largest is None else max(largest, relative)
-        return largest
+            relative += (error[solved] / reference[solved]).tolist()
+        return max(relative, default=None)

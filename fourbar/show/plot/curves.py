@@ -101,7 +101,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     elif chart.zero:
         axes.axhline(0.0, color=INK, lw=0.6, zorder=1)
     if unit == "°":
-        set_degree_ticks(axes.yaxis, float(np.ptp(axes.get_ylim())))
+        set_degree_ticks(axes.yaxis)
     named = chart.symbol if unit == "1" else f"{chart.symbol} ({unit})"
     axes.set(ylabel=named, title=chart.title)
     if len(sizes) > 1:
@@ -147,15 +147,8 @@ def draw_axes(axes: "Axes", view: View) -> Array:
     axis = view.axis
     over = axis.values
     here = axis.factor * float(view.here.at.places[0])
-    axes.set_xlabel(f"{axis.label} ({axis.unit.strip()})")
-    low = float(over[0])
-    high = float(over[-1])
-    if high == low:
-        low = low - 1.0
-        high = high + 1.0
-    axes.set_xlim(low, high)
-    if axis.unit == "°":
-        set_degree_ticks(axes.xaxis, high - low)
+    axis.lay_out(axes)
+    low, high = axes.get_xlim()
     edges = np.flatnonzero(np.diff([False, *~view.sweep.assembled, False]))
     between = np.array([low, *0.5 * (over[:-1] + over[1:]), high])
     for start, stop in between[edges].reshape(-1, 2):

@@ -282,14 +282,11 @@ def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:
     return write_short(value, unit, units, digits=3).replace("-", "−")
 
 
-def set_degree_ticks(axis: Any, span: float) -> None:
+def set_degree_ticks(axis: Any, most: int = 8) -> None:
     """Set ticks at round numbers of degrees."""
-    from matplotlib.ticker import MultipleLocator
+    from matplotlib.ticker import MaxNLocator
 
-    for step in (1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360):
-        if span / step <= 8.0:
-            axis.set_major_locator(MultipleLocator(step))
-            return
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 1.5, 2, 3, 4.5, 5, 6, 9, 10]))
 
 
 def place_legend(axes: "Axes", columns: int = 4) -> None:

@@ -5,11 +5,12 @@ Bands are drawn for torque, pin forces and points.
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.quantities import Array
 from fourbar.scene import command
 from fourbar.show.plot.figures import compose, write_heading
 from fourbar.show.plot.style import (
@@ -21,7 +22,6 @@ from fourbar.show.plot.style import (
     choose_scale,
     format_of,
     place_legend,
-    set_degree_ticks,
 )
 from fourbar.show.plot.view import axis_of
 from fourbar.show.tolerances import describe_parted, find_part_unit, list_drawn_parts
@@ -65,14 +65,17 @@ def draw_tolerances(
         )
     parts = list_drawn_parts(spreads)[:_MOST_BANDS]
     columns = (len(parts) + 2) // 2
+    axis = axis_of(spreads.scene, command(spreads.scene), units)
 
     def paint(figure: "SubFigure") -> str:
         panels = figure.subplots(2, columns, squeeze=False).ravel()
+        for axes in panels[: len(parts) + 1]:
+            axis.lay_out(axes, 4)
         for axes, part in zip(panels, parts, strict=False):
-            _draw_band(axes, spreads, part, units)
+            _draw_band(axes, spreads, part, axis.values, units)
         for axes in panels[len(parts) + 1 :]:
             axes.set_axis_off()
-        _draw_shares(panels[len(parts)], spreads, parts[0], units)
+        _draw_shares(panels[len(parts)], spreads, parts[0], axis.values)
         low, high = BAND_PERCENTILES
         lines = [
             f"Deviation from the nominal. Filled: {low:g} to {high:g} % of the samples;"
@@ -89,18 +92,10 @@ def draw_tolerances(
         Drawing(figure).save(path)
 
 
-def _lay_out_positions(axes: "Axes", spreads: Tolerances, units: Conversion) -> Any:
-    over = axis_of(spreads.scene, command(spreads.scene), units)
-    axes.set_xlim(over.values.min(), over.values.max())
-    if over.unit == "°":
-        set_degree_ticks(axes.xaxis, 2.0 * float(np.ptp(over.values)))
-    axes.set_xlabel(f"{over.label} ({over.unit.strip()})")
-    return over.values
-
-
-def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) -> None:
+def _draw_band(
+    axes: "Axes", spreads: Tolerances, part: str, over: Array, units: Conversion
+) -> None:
     spread = spreads.spreads[part]
-    over = _lay_out_positions(axes, spreads, units)
     ends = np.array([spread.low, spread.high, spread.least, spread.greatest])
     lines = np.concatenate([ends - spread.nominal, [spread.worst, -spread.worst]])
     sizes = np.abs(lines[:5])
@@ -120,14 +115,8 @@ def _draw_band(axes: "Axes", spreads: Tolerances, part: str, units: Conversion) 
     axes.set(ylabel=f"deviation ({unit})", title=part)
 
 
-def _draw_shares(
-    axes: "Axes",
-    spreads: Tolerances,
-    part: str,
-    units: Conversion,
-) -> None:
+def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, over: Array) -> None:
     spread = spreads.spreads[part]
-    over = _lay_out_positions(axes, spreads, units)
     with np.errstate(all="ignore"):
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))

@@ -21,7 +21,11 @@ from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
 from fourbar.show.driving import lacks_friction, leaves_range, read_drive_demand
-from fourbar.show.plot.style import join_points, write_labelled_quantity
+from fourbar.show.plot.style import (
+    join_points,
+    set_degree_ticks,
+    write_labelled_quantity,
+)
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
@@ -225,6 +229,16 @@ class Axis(NamedTuple):
     values: Array
     """Values of the sweep, in the unit."""
 
+    def lay_out(self, axes: Any, most_ticks: int = 8) -> None:
+        """Set the ends, the ticks and the name of a horizontal axis."""
+        low = float(self.values.min())
+        high = float(self.values.max())
+        room = 1.0 if low == high else 0.0
+        axes.set_xlim(low - room, high + room)
+        if self.unit == "°":
+            set_degree_ticks(axes.xaxis, most_ticks)
+        axes.set_xlabel(f"{self.label} ({self.unit.strip()})")
+
     def words(self, place: float, digits: int = 4) -> str:
         """Write a place, which is in SI, with its symbol and unit."""
         return f"{self.symbol} = {self.write(place, digits)}"
@@ -252,11 +266,8 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
-    if solution.at.moves_stroke:
-        where = write_in_units("m", float(solution.at.stated[0][0]))
-    else:
-        where = f"{math.degrees(solution.at.angle[0]):.6g} deg"
-    return f"{solution.commanded} = {where}"
+    place = float(solution.at.stated[0][0])
+    return f"{solution.commanded} = {write_in_units(solution.at.unit, place)}"
 
 
 def list_limits(scene: Scene) -> list[tuple[str, tuple[LimitPosition, ...]]]:
