@@ -266,8 +266,11 @@ def axis_of(scene: Scene, positions: Command, units: Conversion) -> Axis:
 
 def where_in_words(solution: Solution) -> str:
     """Say the first position of a solution as the scene's file has it."""
-    place = float(solution.at.stated[0][0])
-    return f"{solution.commanded} = {write_in_units(solution.at.unit, place)}"
+    if solution.at.moves_stroke:
+        where = write_in_units("m", float(solution.at.stated[0][0]))
+    else:
+        where = f"{math.degrees(solution.at.angle[0]):.6g} deg"
+    return f"{solution.commanded} = {where}"
 
 
 def list_limits(scene: Scene) -> list[tuple[str, tuple[LimitPosition, ...]]]:
