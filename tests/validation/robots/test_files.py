@@ -164,10 +164,14 @@ def test_a_message_begins_with_the_format_of_the_file(
     assert not any(other in message.partition(f"{kind} = ")[2] for other in others)
 
 
-def test_a_usd_is_refused_by_its_name(tmp_path):
-    path = tmp_path / "robot.usd"
+@pytest.mark.parametrize(
+    "name, words",
+    [("r.usd", "USD: give the robot's MJCF, SDF or URDF"), ("r.mjb", "give the MJCF")],
+)
+def test_a_binary_file_is_refused_by_its_name(name, words, tmp_path):
+    path = tmp_path / name
     path.write_bytes(b"PXR-USDC")
-    assert_refused(path, "is a USD: give the robot's MJCF, SDF or URDF")
+    assert_refused(path, words)
 
 
 def assert_refused(path, words):

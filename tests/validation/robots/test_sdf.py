@@ -305,6 +305,12 @@ STATED["a prefix that nothing binds"] = put(
     ('<model name="linkage">', '<model name="linkage" gz:kind="12:30 a:b">')
 )
 STATED["loop joint of a URDF"] = write_urdf(LOOP_JOINT)
+GRAVITY = '<mujoco><compiler/><option gravity="0 -9.81 0"/></mujoco>'
+STATED["gravity in <mujoco> of a URDF"] = write_urdf(LOOP_JOINT + GRAVITY).replace(
+    '<link name="base"/>',
+    '<link name="world"/><link name="base"/><joint name="tilt" type="fixed"><parent'
+    f' link="world"/><child link="base"/><origin rpy="{-math.pi / 2} 0 0"/></joint>',
+)
 STATED["ball constraint of a URDF"] = write_urdf(
     '<drake:ball_constraint><drake:ball_constraint_body_A name="rod"/>'
     f'<drake:ball_constraint_p_AP value="{B} 0 0"/>'
@@ -706,6 +712,9 @@ def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
     )
 
 
+CYCLE = '<joint name="last"><parent link="rod"/><child link="{}"/></joint>'
+
+
 @pytest.mark.parametrize(
     "old, new, said",
     [
@@ -719,6 +728,13 @@ def test_the_pin_of_a_urdf_is_what_advice_changes(tmp_path):
         ('"rocker" xyz', '"racker" xyz', "must name two links"),
         (f'xyz="{C} 0 0"', "", "must name two links"),
         (f'xyz="{C} 0 0"', 'xyz="1 0"', "size 3"),
+        (
+            LOOP_JOINT,
+            f"{LOOP_JOINT}<mujoco><size/></mujoco>",
+            "left out of the URDF: s",
+        ),
+        (LOOP_JOINT, CYCLE.format("rocker"), "'last': closes a loop at rod and rocker"),
+        (LOOP_JOINT, CYCLE.format("base"), "'last': closes a loop at rod and base"),
     ],
 )
 def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(old, new, said, tmp_path):

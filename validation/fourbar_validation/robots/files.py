@@ -24,7 +24,12 @@ _NAMESPACE = r"""\sxmlns\s*=\s*("[^"]*"|'[^']*')"""
 """Namespace of all elements. Simulators take it for an attribute."""
 _PREFIX = r"[<\s](?!xml)([a-zA-Z]\w*):"
 _NO_ENTITY = r"&(?!(?:#\d+|#x[\da-fA-F]+|amp|lt|gt|quot|apos);)"
-_USD = (".usd", ".usda", ".usdc", ".usdz")
+_UNREAD = dict.fromkeys(
+    (".usd", ".usda", ".usdc", ".usdz"),
+    "is a USD: give the robot's MJCF, SDF or URDF, or the pins of its loop to fourbar"
+    " new --pins",
+) | {".mjb": "is a compiled model: give the MJCF that it was compiled from"}
+"""What is said of a file that is not read, by its suffix."""
 _KINDS = {"mujoco": "MJCF", "sdf": "SDF", "robot": "URDF"}
 """Format of a file, by its outermost element."""
 _KINDS_BY_NAME = {".sdf": "SDF", ".world": "SDF", ".urdf": "URDF"}
@@ -42,6 +47,10 @@ NOT_THERE = (
 )
 _TURNING = ("revolute", "continuous", "spherical", None)
 """Types of a pin that closes a loop of a URDF; Drake's states none."""
+_LOOP_JOINT = (
+    '<loop_joint name="B" type="revolute"> <link1 link="ONE" xyz="0 0 0"/> <link2'
+    ' link="TWO" xyz="0 0 0"/> </loop_joint>'
+)
 _STAND_IN = {"vertex": "0 0 0 .001 0 0 0 .001 0 0 0 .001", "scale": "1 1 1"}
 """Tetrahedron of a millimetre in the place of a mesh that is missing, of which a body
 that moves gets a mass of 0.2 mg.
@@ -138,12 +147,8 @@ class _RobotReading:
         """Read and screen everything."""
         if self.assets is not None and not self.assets.is_dir():
             raise InputError("--assets", str(self.assets), "must be a folder")
-        if self.path.suffix.lower() in _USD:
-            raise self._refuse(
-                self.path.name,
-                "is a USD: give the robot's MJCF, SDF or URDF, or the pins of its loop"
-                " to fourbar new --pins",
-            )
+        if other := _UNREAD.get(self.path.suffix.lower()):
+            raise self._refuse(self.path.name, other)
         root = self._parse(self.path)
         if root.tag not in _KINDS:
             raise self._refuse(
@@ -194,8 +199,9 @@ class _RobotReading:
         A polynomial is judged by the motion alone, so that links without mass get one.
         """
         pins = self._take_pins(root)
-        kept = ("link", "joint", "material")
-        others = [child for child in root if child.tag not in kept]
+        kept = ("link", "joint", "material", "mujoco", "compiler", "option")
+        stated = root.findall("mujoco/*")
+        others = [child for child in [*root, *stated] if child.tag not in kept]
         joining = [
             one
             for one in others
@@ -207,11 +213,16 @@ class _RobotReading:
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
             )
         closing = [one.get("name", "") for one in root.findall("gazebo/joint")]
+        bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
+        for compiler in root.findall("mujoco/compiler"):
+            bounds |= compiler.attrib
         root[:] = [child for child in root if child.tag in ("link", "joint")] + pins
         for link in root.iter("link"):
             link[:] = link.findall("inertial")
-        bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
-        ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", bounds)
+        settings = ET.SubElement(root, "mujoco")
+        ET.SubElement(settings, "compiler", bounds)
+        settings.extend(one for one in stated if one.tag == "option")
+        self._refuse_cycles(root)
         if left_out:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")
         self.notes += [
@@ -228,12 +239,26 @@ class _RobotReading:
         if pins:
             return
         self.notes.append(
-            'no loop is closed in this URDF: <loop_joint name="B" type="revolute">'
-            ' <link1 link="ONE" xyz="0 0 0"/> <link2 link="TWO" xyz="0 0 0"/>'
-            " </loop_joint> closes one, with the pin's place in each link; where a"
-            " mimic joint stands for a loop, check-mjcf SCENE FILE --mimic JOINT judges"
-            " it"
+            f"no loop is closed in this URDF: {_LOOP_JOINT} closes one, with the pin's"
+            " place in each link; where a mimic joint stands for a loop, check-mjcf"
+            " SCENE FILE --mimic JOINT judges it"
         )
+
+    def _refuse_cycles(self, root: ET.Element) -> None:
+        """Name a joint between links that other joints join already."""
+        joined = dict[str, set[str]]()
+        for joint in root.findall("joint"):
+            ends = [end.attrib["link"] for end in joint.findall("*[@link]")]
+            groups = [joined.get(end, {end}) for end in ends]
+            together = set[str]().union(*groups)
+            if len(together) < sum(map(len, groups)):
+                raise self._refuse(
+                    joint.get("name"),
+                    f"closes a loop at {' and '.join(ends)}, but joints of a URDF are a"
+                    f" tree: write {_LOOP_JOINT} in its place, with the pin's place in"
+                    " each link",
+                )
+            joined |= dict.fromkeys(together, together)
 
     def _take_pins(self, root: ET.Element) -> list[ET.Element]:
         """Return the pins that close loops, which MuJoCo's own reader passes over.
