@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
     from fourbar.effects.place import Place
 
-FRICTION_STEPS = 100
-"""Steps from pin loads to the friction they make and back. Each lessens the error where
-the friction is far from a jam.
+FRICTION_PASSES = 100
+"""Passes over pin loads and the friction they make. Each lessens the error where the
+friction is far from a jam.
 """
 REPEATED = 4.0 * 2.0**-52
 """Change of a pin load, in parts of the greatest, that is rounding."""
+_DIVERGED = 1e100
+"""Load, N, that only passes running away from each other reach."""
 Components = tuple[float, float]
 """A vector of the plane as plain numbers, as an engine's calls take it. Everywhere else
 vectors are complex numbers, x + i y.
@@ -229,12 +231,13 @@ class Loaded(Assembled, Protocol):
         for act in self.terms:
             act()
 
-    @np.errstate(over="ignore", invalid="ignore")
     def settled(self, balanced: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Solve for pin forces and torque that balance what acts, by name.
 
-        The result is empty where friction jams. Forces are linear in the loads on which
-        friction depends: a pass without them, and one with each of them, tell how.
+        The result is empty where friction jams. Effects that depend on the load of a
+        pin are given the loads of the pass before, until they repeat. Where passes run
+        away friction grows from none: forces are linear in the loads, and a pass with
+        each of them tells how.
         """
 
         def passed(loads: Array) -> tuple[dict[str, Any], ComplexArray]:
@@ -247,24 +250,26 @@ class Loaded(Assembled, Protocol):
         forces, without = passed(loads)
         if not self.loaded:
             return forces
-        probe = float(np.abs(without).max()) or 1.0
+        on_pins = without
+        for _ in range(FRICTION_PASSES):
+            before = loads
+            loads = np.abs(on_pins)
+            if np.abs(loads - before).max() <= REPEATED * loads.max():
+                return forces
+            if not loads.max() < _DIVERGED:
+                break
+            forces, on_pins = passed(loads)
+        probe = float(np.abs(without).max())
         columns = []
         for load in probe * np.eye(len(loads)):
             _, on_pins = passed(load)
             columns.append((on_pins - without) / probe)
-        per_load = np.stack(columns, axis=1)
-        for _ in range(FRICTION_STEPS):
-            before = loads
-            loads = np.abs(without + per_load @ loads)
-            if np.abs(loads - before).max() <= REPEATED * loads.max():
-                break
-        else:
-            unit = np.ones(len(loads))
-            grown, _ = continue_couples(without[None], per_load[None], unit)
-            (loads,) = grown
-            if np.isnan(loads).any():
-                return {}
-        forces, _ = passed(loads)
+        grown, _ = continue_couples(
+            without[None], np.stack(columns, axis=1)[None], np.ones(len(loads))
+        )
+        if np.isnan(grown).any():
+            return {}
+        forces, _ = passed(grown[0])
         return forces
 
 
