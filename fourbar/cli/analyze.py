@@ -104,7 +104,7 @@ def new(
 
     Each number has a unit, like 300mm; or --unit mm is the unit of all.
     """
-    from fourbar.files.scene_text import (
+    from fourbar.files.new_scene import (
         NEW_POSITIONS,
         NEW_SCENE,
         write_drawn_scene,

@@ -27,8 +27,8 @@ from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Entry, SceneFile, split_key
+from fourbar.files.new_scene import write_drawn_scene, write_new_scene
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
-from fourbar.files.scene_text import write_drawn_scene, write_new_scene
 from fourbar.linkage import PINS, POSITIVE, Declared
 from fourbar.quantities.units import find_unit, to_si
 from fourbar.scene import Scene

@@ -30,7 +30,7 @@ whole/test_results_format.py | validation/compare: results_file
 fourbar/effects/test_effects.py | *
 fourbar/edit/test_session.py | dragging scene_entries
 fourbar/edit/test_server.py | redirect
-fourbar/files/test_files.py | scene_text
+fourbar/files/test_files.py | new_scene scene_text
 fourbar/formulas/test_formulas.py | arithmetic many_digits path
 fourbar/studies/test_equilibrium.py | circuit_curve
 fourbar/studies/test_equilibrium.py | fourbar/show: studies

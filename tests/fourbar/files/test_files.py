@@ -27,7 +27,7 @@ from fourbar import (
     Tolerance,
     solve,
 )
-from fourbar.files import dump, load, loads, save, scene_text
+from fourbar.files import dump, load, loads, new_scene, save
 from fourbar_validation.places import MODELS
 from tests.fourbar.test_solving import EXAMPLES, scenes
 from tests.support.refusals import refused
@@ -180,7 +180,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
     length, units, gravity
 ):
     comment = re.compile(r"^# (?=\w+ = |\[)", re.MULTILINE)
-    text = scene_text.write_new_scene([length] * 4)
+    text = new_scene.write_new_scene([length] * 4)
     scene = loads(comment.sub("", text))
     assert len(scene.loads) == 2 and scene.points and len(scene.effects) == 2
     assert scene.effects[0].magnitude == approx(float(gravity))
@@ -194,7 +194,7 @@ def test_the_comments_of_a_new_file_have_its_units_and_can_be_used(
 
 
 def test_a_release_is_written_and_new_bars_weigh_by_their_lengths():
-    scene = loads(scene_text.write_new_scene(("300  mm", "100 mm", "250 mm", "220 mm")))
+    scene = loads(new_scene.write_new_scene(("300  mm", "100 mm", "250 mm", "220 mm")))
     assert [bar.mass for bar in scene.linkage.moving] == [0.1, 0.25, 0.22]
     released = replace(scene, motion=Motion(1.0, free=Free(1.0, 4)))
     assert loads(dump(released)) == released
