@@ -96,6 +96,10 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     most = find_angle(b + c, a, d)
     width = find_width(read_scene(rocker.text()))
     assert width == approx(2.0 * most - 2.0 * math.radians(1.0))
+    drawn = cmath.phase(complex(0.12, 0.2) / complex(0.3, 0.02))
+    least, most = (math.degrees(end - drawn) for end in (-width / 2.0, width / 2.0))
+    with raises(fourbar.InputError, match=f"O2 from {least:.6g} to {most:.6g} deg"):
+        read_scene(rocker.text(), joints={"O2": "100 deg"})
 
 
 @pytest.mark.parametrize(

@@ -447,7 +447,7 @@ class SceneOfLoop(SeenLoop):
         first of them, rad.
         """
         theta_2 = self.loop.angles[1]
-        low, high = _find_assembling(self.inside.linkage, theta_2)
+        low, high = closing = _find_assembling(self.inside.linkage, theta_2)
         if stops := self.stops("O2"):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
@@ -458,6 +458,16 @@ class SceneOfLoop(SeenLoop):
         angles = np.union1d(both_ways, theta_2)
         in_pose = int(np.searchsorted(angles, theta_2))
         theta = self.inside.turn_bars(angles)
+        if np.isnan(theta[in_pose]).any():
+            posed = self.loop.qpos[self.model.jnt_qposadr[self.hinge["O2"]]]
+            ends = posed + self.sense["O2"] * (np.array(closing) - theta_2)
+            ends = np.sort(np.degrees(ends))
+            raise InputError(
+                "MJCF",
+                self.loop.name,
+                f"is open in this pose: it closes with {self._name_hinge('O2')} from"
+                f" {ends[0]:.6g} to {ends[1]:.6g} deg",
+            )
         turns = np.round((theta[in_pose] - self.loop.angles) / math.tau)
         theta -= math.tau * turns
         free = (angles >= low) & (angles <= high)
