@@ -455,20 +455,18 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
 
 
 def test_a_setting_costs_what_the_worst_error_of_a_method_grows_by():
-    """One that lowers some errors and raises others alike changes nothing."""
-
-    def rows(*errors):
-        cells = zip(errors, ("one", "one", "two"), ("F12", "F32", "F12"), strict=True)
-        return [
-            Row.judged(("scene", method, "-"), quantity, error, 1.0, "")
-            for error, method, quantity in cells
+    before, after = (
+        [
+            Row.judged(("scene", method, "-"), quantity, float(error), 1.0, "")
+            for method, quantity, error in read_rows(rows)
         ]
-
-    before = rows(0.1, 0.3, 0.9)
+        for rows in (
+            "one | F12 | 0.1\none | F32 | 0.3\ntwo | F12 | 0.9",
+            "one | F12 | 0.5\none | F32 | 0.1\ntwo | F12 | 0.9",
+        )
+    )
     one = Difference("closure.solref", (0.02, 1.0), (0.1, 1.0), "")
-    priced = price(one, rows(0.3, 0.1, 0.9), before)
-    assert priced.cost == 0.0
-    priced = price(one, rows(0.5, 0.1, 0.9), before)
+    priced = price(one, after, before)
     assert (priced.cost, priced.quantity) == (approx(0.2), "F12")
 
 

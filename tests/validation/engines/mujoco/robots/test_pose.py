@@ -99,33 +99,44 @@ def test_the_loop_closes_in_the_assembly_that_the_ranges_hold(text, joints):
         assert qpos[0] == approx(require("handle", joints["handle"], "rad"))
 
 
+TWO_CLAMPS = """
+<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="handle" range="-1.16 2.12"/><geom size=".01"/>
+    <body pos=".1 0 0"><joint range="-3.05 3.05"/><geom size=".01"/>
+      <site name="coupler" pos=".2 0 0"/></body></body>
+  <body pos=".18 0 0"><joint range="-2.72 .35"/><geom size=".01"/>
+    <site name="rocker" pos=".14 0 0"/></body>
+  <body><joint name="grip" range="-1.16 2.12"/><geom size=".01"/>
+    <body pos=".1 0 0"><joint range="-3.05 3.05"/><geom size=".01"/>
+      <site name="hook" pos=".2 0 0"/></body></body>
+  <body pos="{} 0 0"><joint range="-2.72 .35"/><geom size=".01"/>
+    <site name="eye" pos=".14 0 0"/></body></worldbody>
+  <equality><connect site1="coupler" site2="rocker"/><connect site1="hook" site2="eye"/>
+  </equality></mujoco>"""
+"""No one joint that starts elsewhere closes both."""
+ROW = """
+<mujoco><worldbody><body><joint name="a"/><geom size=".1"/></body>
+<body><joint name="b"/><geom size=".1"/></body>
+<body><joint name="c"/><geom size=".1"/></body>
+<body><joint name="d"/><geom size=".1"/></body></worldbody>
+<equality><joint joint1="b" joint2="a" polycoef=".1 1 0 0 0"/>
+<joint joint1="d" joint2="c" polycoef=".1 1 0 0 0"/>
+<joint joint1="c" joint2="b" polycoef=".1 1 0 0 0"/></equality></mujoco>"""
+
+
 @pytest.mark.parametrize(
     "place, told", [(".18", "the loops are closed again"), ("9", "no pose near this")]
 )
 def test_loops_without_common_joints_close_each_by_itself(place, told):
-    """No one joint that starts elsewhere closes both."""
-    bodies, _, closure = CLAMP.partition("</worldbody>")
-    _, _, other = bodies.replace('"handle"', '"grip"').partition("<worldbody>")
-    other = re.sub('name="(coupler|rocker)"', r'name="other_\1"', other)
-    other = other.replace('pos=".18 ', f'pos="{place} ')
-    pin = '<connect site1="other_coupler" site2="other_rocker"/></equality>'
-    both = closure.replace("</equality>", pin)
-    posed = pose(f"{bodies}{other}</worldbody>{both}")
-    (note,) = posed.notes
-    assert note.startswith(told)
+    posed = pose(TWO_CLAMPS.format(place))
     handle, grip = (position(posed, name) for name in ("handle", "grip"))
+    assert posed.notes[0].startswith(told)
     assert handle == position(pose(CLAMP), "handle") != 0.0
     assert (handle == grip) == (place == ".18")
 
 
 def test_equalities_that_share_a_joint_close_together():
-    hinge = '<body><joint name="{}"/><geom size=".1"/></body>'
-    tie = '<joint joint1="{}" joint2="{}" polycoef=".1 1 0 0 0"/>'
-    ties = "".join(map(tie.format, "bdc", "acb"))
-    text = f"<worldbody>{''.join(map(hinge.format, 'abcd'))}</worldbody>"
-    posed = pose(f"<mujoco>{text}<equality>{ties}</equality></mujoco>")
-    assert np.diff(posed.data.qpos) == approx(0.1, abs=1e-9)
-    assert posed.notes[0].startswith("the loops are closed again")
+    assert np.diff(pose(ROW).data.qpos) == approx(0.1, abs=1e-9)
 
 
 @pytest.mark.slow
