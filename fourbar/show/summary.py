@@ -309,5 +309,6 @@ class Facts:
             reference = np.maximum(size, usual)
             # where most are exactly zero, so may be one with an error bar
             solved &= reference > 0.0
-            relative += (error[solved] / reference[solved]).tolist()
+            if solved.any():
+                relative.append(float((error[solved] / reference[solved]).max()))
         return max(relative, default=None)
