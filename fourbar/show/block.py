@@ -576,19 +576,18 @@ class SceneBlock(Facts):
             head = f"{kind} {describe_drive(scene).removeprefix('along a line ')}"
         if motion.speed is None:
             return head if motion.law is None else f"{head}, by a law over time"
+        _, speeds, accelerations = self.solution.at.stated
         si = "rad/s" if motion.stroke is None else "m/s"
         drives = scene.drive is None and scene.drive_bar == motion.bar
         other = not drives and motion.stroke is None
         speed = "at rest"
-        if np.any(motion.speed):
-            speed = write_ends(motion.speed, lambda x: self._value(x, si))
+        if np.any(speeds):
+            speed = write_ends(speeds, lambda x: self._value(x, si))
             speed = f"at {speed}" if other else speed
         if other:
             speed = f"the {BAR_NAMES[motion.bar]} {speed}"
-        if np.any(motion.acceleration):
-            growth = write_ends(
-                motion.acceleration, lambda x: self._value(x, f"{si}^2")
-            )
+        if np.any(accelerations):
+            growth = write_ends(accelerations, lambda x: self._value(x, f"{si}^2"))
             speed += f", {motion.names[2]} = {growth}"
         return f"{head}, {speed}"
 

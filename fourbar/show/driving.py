@@ -8,6 +8,7 @@ from fourbar.formulas.path import count_turns
 from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
 from fourbar.scene import Scene
+from fourbar.show.shown_units import drop_rounding
 from fourbar.solution import Solution
 
 _SAME_RATE = 1e-9
@@ -68,11 +69,12 @@ def find_starts(solution: Solution) -> Array:
     """Return the senses in which positions at rest start to move, (n,).
 
     That of a position with dry friction is the sense of its acceleration, 1 or -1.
-    Elsewhere it is 0.
+    Elsewhere it is 0, and where that is the rounding with which a law ends.
     """
-    at_rest = lacks_friction(solution) & (solution.at.speed == 0.0)
-    senses: Array = at_rest * np.sign(solution.at.acceleration)
-    return senses
+    at = solution.at
+    at_rest = lacks_friction(solution) & (at.speed == 0.0)
+    largest = float(np.nanmax(np.abs(at.acceleration), initial=0.0))
+    return np.asarray(at_rest * np.sign(drop_rounding(at.acceleration, largest)))
 
 
 def leaves_range(solution: Solution) -> Any:

@@ -247,7 +247,9 @@ class Panels:
     def find_rests(self, name: str) -> Array:
         """Find the places at which a curve begins or ceases to be zero for a while."""
         is_zero = self._are_zero(name)
-        return np.asarray(self.start[1:][is_zero[1:] != is_zero[:-1]])
+        known = np.isfinite(self.curves[name].sizes.sum(axis=1))
+        changes = (is_zero[1:] != is_zero[:-1]) & known[1:] & known[:-1]
+        return np.asarray(self.start[1:][changes])
 
     def _are_zero(self, name: str) -> NDArray[np.bool_]:
         """Mark the panels in which a curve is zero, (p,)."""

@@ -202,7 +202,7 @@ SHOWN_DIGITS, POSITION_DIGITS = 4, 6
 """Significant digits of a number of a summary, and of one about a single position."""
 
 
-def drop_rounding(values: Array, largest: float | Array) -> Array:
+def drop_rounding(values: float | Array, largest: float | Array) -> Array:
     """Return numbers with zero for what is rounding of the largest of their kind."""
     return np.where(np.abs(values) <= SHOWN_AS_ZERO * largest, 0.0, values)
 

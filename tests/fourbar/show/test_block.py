@@ -30,6 +30,7 @@ from fourbar import (
     Springs,
     Sweep,
     Table,
+    command,
     dump,
     equilibrium,
     limit_positions,
@@ -303,6 +304,20 @@ motion.omega_2 = ["1 rad/s", "1 rad/s", "5 rad/s"]
 effects.gravity = ["10 m/s^2", "-90 deg"]
 says = [" at 9.549 rpm "]
 never = "N m at 47"
+["a start, and a position with the rounding of an acceleration"]
+motion.theta_2 = ["10 deg", "50 deg"]
+motion.omega_2 = ["0 rad/s", "0 rad/s"]
+motion.alpha_2 = ["9 rad/s^2", "-1e-14 rad/s^2"]
+effects.friction.O2 = "9 N m"
+says = ["N m at theta_2 = 10 deg, against", "N m at theta_2 = 50 deg: dry friction"]
+never = "without bound"
+["at rest beyond a limit"]
+lengths = { ground = "0.3 m", input = "0.4 m", coupler = "0.2 m", output = "0.25 m" }
+motion.theta_2 = { from = "10 deg", to = "170 deg", steps = 9 }
+motion.omega_2 = "0 rad/s"
+effects.friction.O4 = "1 N m"
+says = ["drive on the input, at rest"]
+never = "stop or start"
 ["a drive that brakes more than it drives"]
 lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
 bars.input = { mass = "2 kg", centre = ["0.1 m", "0 deg"] }
@@ -404,6 +419,14 @@ def test_the_block_says(name):
     for words in said:
         assert words in text, text
     assert not re.search(unsaid, text), text
+
+
+def test_the_head_of_one_listed_position_has_its_own_rates():
+    listed = Motion([0.2, 1.4], [0.0, 9.0], [3.0, -1.0])
+    scene = crank_rocker(motion=listed)
+    text = read_block(solve(scene, at=command(scene).part([0])))
+    assert "drive on the input, at rest, alpha_2 = 3 rad/s²" in text
+    assert "at rest" not in block(scene) and "-1 rad/s² to 3" in block(scene)
 
 
 def test_the_block_has_the_numbers_of_the_facts():
