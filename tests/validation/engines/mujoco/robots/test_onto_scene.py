@@ -1,6 +1,7 @@
 """A loop is closed onto the assembly of its scene, or its pose is refused."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -8,12 +9,15 @@ import fourbar
 from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
+from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
 from fourbar_validation.robots.loop_errors import find_left_out, find_worst_of_loop
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
 from tests.support.robots import (
+    AS_DRAWN,
     answer_of,
     examine_text,
+    file_of,
     measure,
     measure_all,
     notes_of,
@@ -75,6 +79,16 @@ def test_a_flat_rest_pose_is_closed_onto_the_assembly_of_the_scene(branch):
     loop = measure(TEXT, scene)
     assert find_left_out(loop) < SCENE_ROUND_OFF
     assert find_worst_of_loop(loop) < 0.06
+    assert f"onto the {branch} one of the scene" in find_in_line(loop)
+
+
+@pytest.mark.parametrize("branch", ["open", "crossed"])
+def test_a_pose_is_closed_onto_the_assembly_of_a_scene_of_other_lengths(branch):
+    """The outputs are 0.01 rad apart, which is no other assembly."""
+    scene = make_scene(branch)
+    linkage = replace(scene.linkage, input=fourbar.Bar(0.152))
+    scene = replace(scene, linkage=linkage)
+    loop = find_loop_of_scene(file_of(TEXT), scene, AS_DRAWN).loop
     assert f"onto the {branch} one of the scene" in find_in_line(loop)
 
 

@@ -250,7 +250,8 @@ def close_onto(
             " not tell the assembly: "
         )
         found = f"the loop is closed onto the {wanted} one of the scene"
-        if miss_output(scene, moved.angles) > FLAT:
+        is_open = miss_output(scene, moved.angles) == math.inf
+        if is_open or is_seen_from_behind(scene, moved.angles):
             found = "no pose that was tried closes onto that of the scene"
         text += found
     else:
