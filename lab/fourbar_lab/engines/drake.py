@@ -189,7 +189,10 @@ class _DrakeTree(Tree):
         self.plant.get_applied_generalized_force_input_port().FixValue(
             self.context, self.balancing
         )
-        borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
+        try:
+            borne = self.plant.get_reaction_forces_output_port().Eval(self.context)
+        except RuntimeError as error:  # its mass matrices are inverted there
+            raise LimitError(f"the reaction port of Drake: {error}") from None
         return {
             b: self.rotate(
                 b, complex(*borne[int(joint.index())].translational()[:2].tolist())

@@ -118,10 +118,6 @@ class Loaded(Assembled, Protocol):
         Empty where a toggle leaves them 0/0.
         """
 
-    def refusal(self) -> str:
-        """Return why what was answered does not count, or nothing."""
-        return ""
-
     def point(self, name: str) -> Array:
         """Locate a point that `description.parts` names, world axes, (2,), m.
 

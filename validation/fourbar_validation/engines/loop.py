@@ -205,8 +205,8 @@ class Exact:
 
     name: str
     build: Callable[[Scene], Loaded]
-    """Function that builds the engine's bars from the description. LimitError says why
-    the engine cannot hold them.
+    """Function that builds the engine's bars from the description. LimitError, of it or
+    of a method of the bars, says why the engine cannot hold them.
     """
     commands: tuple[str, ...] = ("theta_2", "theta_3", "theta_4", "stroke")
 
@@ -214,9 +214,11 @@ class Exact:
         """Answer, or refuse by naming what it does not know or cannot hold."""
         scene = state_from_pins(scene)
         try:
-            bars = self.build(scene)
+            return self._answer(self.build(scene), scene, command)
         except LimitError as error:
             return Answer(self.name, "exact", refusal=str(error))
+
+    def _answer(self, bars: Loaded, scene: Scene, command: Command) -> Answer:
         start = time.perf_counter()
         asked = command
         moves = command.speed is not None
@@ -251,8 +253,6 @@ class Exact:
             return values
 
         out, assembled, gap = read_each(bars, command, names, read)
-        if reason := bars.refusal():
-            return Answer(self.name, "exact", refusal=reason)
         for name in ANGLES:  # continuous along the sweep
             out[name][assembled] = np.unwrap(out[name][assembled])
         return Answer(
