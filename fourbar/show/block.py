@@ -44,7 +44,7 @@ from fourbar.show.columns import explain_static
 from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
-from fourbar.show.motion_curves import acts, find_drive_rounding
+from fourbar.show.motion_curves import MotionCurves, acts, find_drive_rounding
 from fourbar.show.panels import LOWER, TIED, UPPER
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import (
@@ -425,10 +425,13 @@ class SceneBlock(Facts):
         if self.held and self.peak is not None:
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
-        if (start := self.motion.start) is not None:
-            value = self._value(start.value, self.drive.unit)
-            place = self._place(start.place)
-            yield _row("to start", f"{value} at {place}, against dry friction")
+        if self.motion.started is not self.motion:
+            start = self.motion.start
+            row = self._write_growth(self.drive.keys.value, self.motion.started)
+            if start is not None:
+                value = self._value(start.value, self.drive.unit)
+                row = f"{value} at {self._place(start.place)}"
+            yield _row("to start", f"{row}, against dry friction")
         yield from self._write_stroke()
         yield from self._write_power()
         if self.pressure is not None and self.stroke_range is not None:
@@ -452,12 +455,19 @@ class SceneBlock(Facts):
         mean = self._value(rms, drive.unit, largest, FAR_BELOW_PEAK)
         return f"{row}, RMS {mean}"
 
-    def _write_growth(self, name: str) -> str:
-        """Write where a quantity grows without bound."""
-        poles = self.motion.panels.list_poles(name)
-        places = [self._place(poles[0])]
-        places += [self._place(pole, named=False) for pole in poles[1:]]
-        return f"grows without bound at {' and '.join(_shorten(places))}"
+    def _write_growth(self, name: str, *motions: MotionCurves) -> str:
+        """Write where a quantity grows without bound, of this motion or of others.
+
+        The text is empty where it does not.
+        """
+        poles = [
+            self._place(pole, named=False)
+            for motion in motions or [self.motion]
+            for pole in motion.panels.list_poles(name)
+        ]
+        places = " and ".join(_shorten([*dict.fromkeys(poles)]))
+        at = f"{self.symbol}{_NBSP}={_NBSP}{places}"
+        return f"grows without bound at {at}" if poles else ""
 
     @property
     def _of_positions(self) -> str:
@@ -469,20 +479,19 @@ class SceneBlock(Facts):
         rests = "dry friction holds"
         if not self.is_held_at_rest:
             rests = "a pin with dry friction rests"
-        parts = []
-        for least, most, (first, last), varies in self.held:
+        assert self.drive is not None
+        growth = self._write_growth(self.drive.keys.value, *self.motion.begun)
+        parts = [growth] if growth else []
+        for least, most, ends, varies in () if growth else self.held:
             bounds = [*map(self._without_rounding, (least, most))]
             size = max(map(abs, bounds))
             holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
-            if len(self.solution) == 1:
-                return f"{holds}: {rests}"
-            if first == last:
-                parts.append(f"{holds} at {self._place(first)}")
-            else:
-                until = self._place(last, named=False)
-                over = f"{self._place(first)} to {until}"
-                share = ", a part of it at each position" if varies else ""
-                parts.append(f"{holds} over {over}{share}")
+            if ends is not None and len(self.solution) > 1:
+                first, last = ends
+                until = f" to {self._place(last, named=False)}"
+                over = f"over {self._place(first)}{until}"
+                holds += f" {f'at {self._place(first)}' if first == last else over}"
+            parts.append(holds + ", a part of it at each position" * varies)
         return f"{', '.join(_shorten(parts))}: {rests}"
 
     def _without_rounding(self, value: float) -> float:
@@ -622,22 +631,16 @@ class SceneBlock(Facts):
 
         Where dry friction holds a linkage at rest, they suffice to move it.
         """
-        if self.peak is None:
+        ways = [way.panels for way in self.motion.begun]
+        if not all(way.has_value(LINE.value) for way in ways):
             yield _row("bore", "none is enough, as the force grows without bound")
             return
-        panels = self.motion.panels
-        solution = self.motion.solve_between()
         parts = []
-        for sense, rank, end, does in (
-            (1.0, UPPER, LINE.high, " to push"),
-            (-1.0, LOWER, LINE.low, ", and the rod's area besides, to pull"),
+        for sense, rank, does in (
+            (1.0, UPPER, " to push"),
+            (-1.0, LOWER, ", and the rod's area besides, to pull"),
         ):
-            force = sense * panels.find_peak(LINE.value, rank).value
-            if self.motion.start:  # the peak leaves out the friction it works against
-                force = 0.0
-            if getattr(solution, end) is not None:
-                demand = self.motion.read_demand(end)
-                force = max(force, np.nanmax(sense * demand))
+            force = max(sense * way.find_peak(LINE.value, rank).value for way in ways)
             if force > 0.0:
                 bore = math.sqrt(4.0 * force / (math.pi * pressure))
                 parts.append(
@@ -667,12 +670,14 @@ class SceneBlock(Facts):
 
         The list is empty where dry friction does not hold the linkage, or adds nothing.
         """
-        rests = self.drive is not None and not np.any(self.solution.at.speed)
-        if not rests or not (self.held or self.motion.start):
+        ways = self.motion.begun
+        if ways[0] is self.motion:
             return []
-        from_rest = self.motion.from_rest
-        has_value = self.motion.panels.has_value
-        sizes = [from_rest[name] if has_value(name) else None for name in names]
+        sizes = list[float | None]()
+        for name in names:
+            peaks = [way.find_peak(name) for way in ways]
+            known = [abs(peak.value) for peak in peaks if peak]
+            sizes.append(max(known) if len(known) == len(ways) else None)
         cells = self._cells(sizes, unit, "unbounded")
         adds = cells != self._write_peaks(names, unit)[0]
         return [("  to move", cells)] if adds else []

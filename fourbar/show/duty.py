@@ -212,13 +212,9 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     kind = "torque" if solution.drive is None else "force"
     numbers: dict[str, Any] = dict.fromkeys(DUTY_UNITS)
     for name, curve in ((kind, drive.keys.value), ("power", "power")):
-        peak = motion.find_peak(curve)
+        peak = (motion.started if name == kind else motion).find_peak(curve)
         numbers[f"peak_{name}"] = peak and abs(peak.value)
         numbers[f"rms_{name}"] = motion.find_rms(curve)
-    largest = numbers[f"peak_{kind}"]
-    if motion.start is not None and largest is not None:
-        demand = motion.read_demand(drive.keys.value)
-        numbers[f"peak_{kind}"] = float(np.nanmax(np.abs(demand)))
     fastest = motion.find_peak("speed")
     numbers["peak_speed"] = fastest and abs(fastest.value)
     closed = bool(is_once_round(solution)) and not motion.stretches

@@ -7,7 +7,7 @@ instants of a released motion only where its angles are largest or smallest.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,12 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
-from fourbar.show.driving import find_starts, is_once_round, read_drive_demand
+from fourbar.show.driving import (
+    find_starts,
+    is_once_round,
+    lacks_friction,
+    read_drive_demand,
+)
 from fourbar.show.panels import (
     DEEP,
     SHALLOW,
@@ -48,8 +53,8 @@ _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
 """
-_BEGINNING = 1e-150
-"""Speed of a linkage that begins to move, rad/s. Its square is zero; dry friction has
+_BEGINNING = 1e-100
+"""Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
 its sign.
 """
 _POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
@@ -91,14 +96,6 @@ class MotionCurves:
         """Solve at commanded angles or strokes, or at the times of a motion law."""
         return solve(self.scene, stage, at=command_at(self.scene, places))
 
-    def solve_between(self) -> Solution:
-        """Solve at the ends and the nodes of all panels, or take the positions."""
-        panels = self.panels
-        if not panels.located:
-            return self.solution
-        nodes = panels.list_nodes().ravel()
-        return self.solve_at(np.concatenate([panels.start, nodes, panels.stop[-1:]]))
-
     def list_jumps(self, symbol: str, write: Callable[[float], str]) -> Iterator[str]:
         """Say where dry friction makes forces jump, places as `write` has them."""
         for cause, jumps in (
@@ -134,64 +131,61 @@ class MotionCurves:
         return self.solve_at(places)
 
     @cached_property
-    def from_rest(self) -> dict[str, float]:
-        """Largest pin forces and bending moments as the linkage begins to move.
+    def begun(self) -> "list[MotionCurves]":
+        """Curves of the ways in which whatever dry friction holds begins to move.
 
-        Both directions count, each against the whole of dry friction, unless an
-        acceleration says which.
+        An acceleration says which way. Along a law, where friction at rest is a limit
+        of what stands beside it, and where nothing is held, they are these curves.
         """
-        solution = self.solve_between()
-        senses = find_starts(solution)
-        largest = dict[str, float]()
-        # where every position starts, its acceleration says the one direction
-        for sense in (1.0, -1.0) if (senses == 0.0).any() else (1.0,):
-            speed = _BEGINNING * np.where(senses == 0.0, sense, senses)
-            begun = solve(self.scene, at=solution.at._replace(speed=speed))
-            loads = compute_pin_loads(begun)
-            for bar, bending in compute_bending(begun).items():
-                loads[f"bending_{bar}"] = np.abs(bending.moment)
-            for name, load in loads.items():
-                least = largest.get(name, 0.0)
-                largest[name] = float(np.nanmax(load, initial=least))
-        return largest
+        solution = self.solution
+        held = lacks_friction(solution) & (solution.at.speed == 0.0)
+        if solution.time is not None or not held.any():
+            return [self]
+        if find_starts(solution)[held].all():
+            return [self.started]
+        return [self._begin(sense) for sense in (1.0, -1.0)]
 
     @cached_property
-    def starts(self) -> Array:
-        """Torque or force of the drive that starts each position of `solve_between`.
+    def started(self) -> "MotionCurves":
+        """Curves of the motion where its accelerations start it from rest.
 
-        It has the stated acceleration, against dry friction; NaN where nothing starts.
+        They work against the whole of dry friction.
         """
-        solution = self.solve_between()
-        senses = find_starts(solution)
-        starts = np.full(len(solution), np.nan)
-        if (rows := np.flatnonzero(senses)).size:
-            at = solution.at.part(rows)._replace(speed=_BEGINNING * senses[rows])
-            name = read_drive_demand(solution).keys.value
-            starts[rows] = solve(self.scene, at=at)[name]
-        return starts
+        starts = self.solution.time is None and find_starts(self.solution).any()
+        return self._begin(0.0) if starts else self
 
-    def read_demand(self, name: str) -> Array:
-        """Return a quantity of the drive, or what starts each position, (n,).
+    def _begin(self, sense: float) -> "MotionCurves":
+        """Return the curves with a beginning wherever the motion is at rest.
 
-        The positions are those of `solve_between`.
+        `sense`: of the speed where no acceleration says it; 0: nothing begins there.
         """
-        values: Array = self.solve_between()[name]
-        return np.where(np.isnan(self.starts), values, self.starts)
+        scene = self.scene
+        at = self.solution.at
+        if self.panels.located:
+            senses = np.sign(scene.motion.acceleration) or sense
+            motion = scene.motion.replace(speed=_BEGINNING * senses)
+            scene = replace(scene, motion=motion)
+            at = command_at(scene, at.places)
+        else:
+            senses = find_starts(self.solution)
+            begun = _BEGINNING * np.where(senses == 0.0, sense, senses)
+            stated: Any = at.speed
+            at = at._replace(speed=np.where(stated == 0.0, begun, stated))
+        return describe_motion(solve(scene, at=at))
 
     @cached_property
     def start(self) -> Peak | None:
-        """Largest torque or force of the drive that starts a motion from rest.
+        """Largest torque or force of the drive that starts the motion from rest.
 
-        Along a law it is a limit of what stands between the positions, and None here.
+        None if nothing starts, or if it grows without bound.
         """
-        if self.panels.located and (
-            self.scene.motion.law or np.any(self.solution.at.speed)
-        ):
-            return None
-        sizes = np.nan_to_num(np.abs(self.starts))
-        row = int(np.argmax(sizes))
-        place = float(self.solve_between().at.places[row])
-        return Peak(float(self.starts[row]), place) if sizes[row] else None
+        name = read_drive_demand(self.solution).keys.value
+        if self.started is self or self.panels.located:
+            return None if self.started is self else self.started.find_peak(name)
+        values = self.started.solution[name]
+        sizes = np.abs(values) * (find_starts(self.solution) != 0.0)
+        row = int(np.argmax(np.nan_to_num(sizes)))
+        return Peak(float(values[row]), float(self.solution.at.places[row]))
 
     @property
     def is_steady(self) -> bool:

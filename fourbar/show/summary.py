@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import OK
+from fourbar.quantities import OK, Array
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
 from fourbar.show.driving import (
@@ -66,10 +66,19 @@ class HeldRange(NamedTuple):
     """Least torque or force of the drive that holds one of them."""
     high: float
     """Greatest torque or force that holds one of them."""
-    ends: tuple[float, float]
-    """Commanded angle or stroke of the first and the last, rad or m, or the time, s."""
+    ends: tuple[float, float] | None
+    """Commanded angle or stroke of the first and the last, rad or m, or the time, s.
+    None: all positions.
+    """
     varies: bool
     """False if each of them is held from `low` to `high`, as in a dwell."""
+
+    @classmethod
+    def of(cls, ends: tuple[float, float] | None, bounds: Array) -> "HeldRange":
+        """Return the range of what holds, each of two bounds at some places, (2, n)."""
+        low, high = float(bounds.min()), float(bounds.max())
+        varies = np.ptp(bounds, axis=1).max() > TIED * (high - low)
+        return cls(low, high, ends, bool(varies))
 
 
 class Facts:
@@ -212,22 +221,22 @@ class Facts:
         rows = np.flatnonzero(leaves_range(solution))
         if self.drive is None or not len(rows):
             return []
-        if not np.any(solution.at.speed):  # held between the positions too
-            solution = self.motion.solve_between()
-            rows = np.flatnonzero(leaves_range(solution))
-        low = getattr(solution, self.drive.keys.low)
-        high = getattr(solution, self.drive.keys.high)
-        places = solution.at.places
+        name, _, *both = self.drive.keys
+        if self.motion.panels.located and not np.any(solution.at.speed):
+            peaks = [  # between the positions too
+                [way.panels.find_peak(name, rank).value for rank in (LOWER, UPPER)]
+                for way in self.motion.begun
+            ]
+            return [HeldRange.of(None, np.array(peaks))]
+        bounds = np.array([solution[end] for end in both])
+        places = solution.at.places.tolist()
         ranges = list[HeldRange]()
         for run in split_runs(rows):
             is_end = run[0] == len(solution) - 1 and rows[0] == 0
             if self.kind == "turn" and ranges and is_end:
                 continue
-            ends = float(places[run[0]]), float(places[run[-1]])
-            least, most = float(low[run].min()), float(high[run].max())
-            gap = max(np.ptp(low[run]), np.ptp(high[run]))
-            varies = bool(gap > TIED * (most - least))
-            ranges.append(HeldRange(least, most, ends, varies))
+            ends = places[run[0]], places[run[-1]]
+            ranges.append(HeldRange.of(ends, bounds[:, run]))
         return ranges
 
     @cached_property

@@ -316,8 +316,26 @@ lengths = { ground = "0.3 m", input = "0.4 m", coupler = "0.2 m", output = "0.25
 motion.theta_2 = { from = "10 deg", to = "170 deg", steps = 9 }
 motion.omega_2 = "0 rad/s"
 effects.friction.O4 = "1 N m"
-says = ["drive on the input, at rest"]
-never = "stop or start"
+says = ["rest grows without bound at theta_2 = 78.58 deg: dry friction holds"]
+never = "stop or start|[kMG]N"
+["held across a pole that friction alone has"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+motion.theta_2 = { from = "0 deg", to = "90 deg", steps = 90 }
+motion.omega_2 = "0 rad/s"
+drive.bar = 4
+effects.friction.O2 = "0.5 N m"
+# bars 2 and 3 are in line: cos psi = (d^2 + (a + b)^2 - c^2)/(2 d (a + b))
+says = ["rest grows without bound at theta_2 = 38.61 deg: dry", "to move unbounded"]
+never = "[kMG]N"
+["a start across such a pole"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+motion.theta_2 = { from = "0 deg", to = "90 deg", steps = 90 }
+motion.omega_2 = "0 rad/s"
+motion.alpha_2 = "1 rad/s^2"
+drive.bar = 4
+effects.friction.O2 = "0.5 N m"
+says = ["to start grows without bound at theta_2 = 38.61 deg, against"]
+never = "holds"
 ["a drive that brakes more than it drives"]
 lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
 bars.input = { mass = "2 kg", centre = ["0.1 m", "0 deg"] }
@@ -479,7 +497,7 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     where = ": dry friction holds"
     if steps > 1:
         digits = 4
-        where = " over theta_2 = 11.46 deg to 80.21 deg, a part of it at each"
+        where = ", a part of it at each position: dry friction holds"
         assert np.ptp(static) > 0.1
     low, high = 1e3 * (static.min() - 0.5), 1e3 * (static.max() + 0.5)
     said = f"at rest {low:.{digits}g} mN m to {high:.{digits}g} mN m{where}"
@@ -629,6 +647,17 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
         printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
         assert printed == approx(np.max(sizes, axis=1), rel=2e-4)
     assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
+
+
+def test_a_list_that_starts_and_moves_bears_the_friction_of_its_start():
+    creeping = Motion([0.2, 1.4], [1e-9, 2.0], [30.0, 0.0])
+    rubs = {"effects": (*WEIGHT, PinFriction.at(A=(0.3, 0.02)))}
+    creeps = solve(crank_rocker(motion=creeping, **rubs))
+    starting = creeping.replace(omega_2=[0.0, 2.0])
+    lines = SceneBlock(solve(crank_rocker(motion=starting, **rubs)), units("N")).write()
+    row = next(line for line in lines if line.startswith("  to move"))
+    pins = [np.hypot(*creeps[name].T).max() for name in PIN_FORCES]
+    assert [float(size) for size in re.findall(r"\d[\d.]*", row)] == approx(pins, 2e-4)
 
 
 def test_a_torque_that_friction_just_holds_is_zero_within_rounding():
