@@ -696,6 +696,23 @@ def test_the_sign_of_one_component_is_named_by_itself(axis, name, read):
     assert first.complete and first.quantities == (name,)
 
 
+def test_rates_of_the_rows_are_named_where_the_scene_states_others(read):
+    rates = np.linspace(3.0, 7.0, 12)
+    numbers = right(OURS, speed=rates, acceleration=-rates)
+    columns = {"omega_2": rates, "alpha_2": -rates, "torque": numbers["torque"]}
+    table = read(tabulate({"theta_2": numbers["theta_2"], **columns}))
+    (told,) = Judgement(OURS, table).explanations
+    assert told.text.endswith("own speed: leave omega_2 and alpha_2 out of the scene")
+    assert told.complete
+
+
+def test_a_size_is_that_of_one_force_without_a_sign(read):
+    numbers = right(OURS)
+    columns = {"theta_2": numbers["theta_2"], "F43": np.hypot(*numbers["F14"].T)}
+    told = Judgement(OURS, read(tabulate(columns))).explanations
+    assert [one.text for one in told] == ["F43 = F14"]
+
+
 @pytest.mark.parametrize("torque, code", [("0.0", HOLDS), ("0.04", FAILED)])
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, check):
     """Bars without mass or load take no torque.

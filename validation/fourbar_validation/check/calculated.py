@@ -152,7 +152,8 @@ def _find_equal_forces(judge: Judge) -> Iterator[Mistake]:
     for name, other in permutations(PIN_FORCES, 2):
         values = judge.right[other]
         yield Mistake(f"{name} = {other}", {name: values}.get, whole=False)
-        yield Mistake(f"{name} = -{other}", {name: -values}.get, whole=False)
+        if f"|{name}|" not in judge.columns:
+            yield Mistake(f"{name} = -{other}", {name: -values}.get, whole=False)
 
 
 def _find_wrong_accelerations(judge: Judge) -> Iterator[Mistake]:

@@ -91,6 +91,28 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
                 yield mistake.within(names, words)
 
 
+def list_rates_of_rows(
+    judge: Judge, differing: list[JudgedColumn]
+) -> Iterator[Mistake]:
+    """List the motion at the rates of the rows, as of a log, if more than these differ.
+
+    They are judged where the scene states its own.
+    """
+    if judge.at.moves_stroke:
+        return
+    omega, alpha = judge.at.names[1:]
+    fields = {"speed": omega, "acceleration": alpha}
+    columns = judge.columns
+    stated: dict[str, Any] = {
+        field: columns[name].theirs for field, name in fields.items() if name in columns
+    }
+    if "speed" in stated and any(one.key not in fields.values() for one in differing):
+        text = f"each row has its own speed: leave {omega} and {alpha} out of the scene"
+        yield solve_other(
+            text, judge.scene, drop_remainder(judge.at)._replace(**stated)
+        )
+
+
 def _change_column(
     right: Solution,
     change: Callable[[Array], Array],
@@ -292,6 +314,7 @@ _SOURCES: tuple[Callable[[Judge, list[JudgedColumn]], Iterator[Mistake]], ...] =
     lambda judge, differing: list_column_mistakes(judge.right),
     lambda judge, differing: find_miscalculated(judge),
     lambda judge, differing: list_hypotheses(judge.scene, judge.at),
+    list_rates_of_rows,
     find_fitted,
 )
 """Sources of mistakes, the cheapest first: one is asked if none before it explains all.
