@@ -393,7 +393,7 @@ def make_solution(
         for name, value in zip(at.names[:2], at.stated, strict=False):
             if name in quantities:
                 quantities[name][...] = value + 0.0 * quantities[name]
-        theta_2 = _turn_first(theta_2)
+        theta_2 = turn_first(theta_2)
         if commanded in quantities:
             quantities[commanded][...] = theta_2 + 0.0 * quantities[commanded]
     of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
@@ -428,8 +428,8 @@ def make_solution(
     )
 
 
-def _turn_first(angle: Array) -> Array:
-    """Turn an angle that follows from a stroke to (-pi, pi] at the first position."""
+def turn_first(angle: Array) -> Array:
+    """Turn an angle that follows from a command to (-pi, pi] where it begins."""
     finite = angle[np.isfinite(angle)]
     if not finite.size:
         return angle

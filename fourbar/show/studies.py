@@ -382,7 +382,9 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
     sizes = np.nan_to_num(np.abs(values))
     most = int(np.argmax(sizes))
     if sizes[most] > 0.0:
-        largest = "largest" if low is None else "largest without friction"
+        largest = "largest of these positions"
+        if low is not None:
+            largest += ", without friction"
         lines.append(
             f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
             f" {_write_degrees(positions.theta_2[most])} deg"

@@ -17,7 +17,7 @@ from fourbar.formulas.mobility import LimitPosition, find_circuit, limit_positio
 from fourbar.formulas.motion import State
 from fourbar.formulas.points import list_circuit
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import Array
+from fourbar.quantities import ANGLES, Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
 from fourbar.show.driving import lacks_friction, leaves_range, read_drive_demand
@@ -28,7 +28,7 @@ from fourbar.show.plot.style import (
 )
 from fourbar.show.shown_units import choose_unit, drop_place_rounding
 from fourbar.solution import Conversion, Solution
-from fourbar.solving import solve
+from fourbar.solving import solve, turn_first
 
 _BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 """Blanks of a note that stay on one line with what stands beside them."""
@@ -363,6 +363,9 @@ def make_view(scene: Scene, position: float | None = None) -> View:
     if over_time:
         return _view_motion(sweep, position)
     of_scene = command(scene)
+    if of_scene.places[0] > of_scene.places[-1]:  # with the turns of the motion
+        for name in {"theta_2", *ANGLES} - {sweep.commanded}:
+            sweep[name][...] = turn_first(sweep[name][::-1])[::-1]
     if position is None and len(of_scene.angle) == 1:
         position = float(of_scene.places[0])
     stated = position is not None

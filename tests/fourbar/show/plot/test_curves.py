@@ -19,7 +19,7 @@ from fourbar.show.plot.curves import CHARTS, draw_chart, list_demand
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.view import make_view
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import bare, crank_rocker
 from tests.support.texts import COORDINATES
 
 SCENE = crank_rocker(
@@ -135,6 +135,15 @@ def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s
     drawn = list_lines("coupler", scene)
     assert [name for name in drawn if name[0] != "_"] == ["$A$", "$B$", "P"]
     assert join(drawn["P"]) == approx(path)
+
+
+def test_a_falling_sweep_is_drawn_with_the_turns_of_its_own_order():
+    """theta_4 passes -180 deg on the way."""
+    scene = crank_rocker(
+        linkage=bare(0.3, 0.1, 0.25, 0.22, 1.0), motion=Motion(Sweep(4.5, 1.5, 9), 1.0)
+    )
+    drawn = make_view(scene).sweep.theta_4[::-1]
+    assert drawn == approx(solve(scene).theta_4) and drawn[-1] < -np.pi < drawn[0]
 
 
 def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
