@@ -15,16 +15,15 @@ import pytest
 from fourbar_validation import engine
 from fourbar_validation.engines import guests, programs
 from tests.support.checkout import read
+from tests.support.texts import put
 
 (PLAIN,) = re.findall(r"```python\n(.*?)```", read("docs/protocol.md"), re.DOTALL)
 """The page's engine in plain Python."""
 
 
-def write_program(folder, name, *replacements):
-    text = PLAIN.replace('"plain"', repr(name))
-    for old, new in replacements:
-        assert old in text
-        text = text.replace(old, new)
+def write_program(folder, name, *words):
+    """Write the page's engine under a name, with other words: each old, then new."""
+    text = put(PLAIN, '"plain"', repr(name), *words)
     file = folder / f"{name.replace(' ', '_')}.py"
     file.write_text(text, "utf-8")
     return shlex.join([sys.executable, "-I", "-S", str(file)])

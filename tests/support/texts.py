@@ -1,4 +1,13 @@
-"""Scene files that several tests share, as text."""
+"""Scene files that several tests share, as text, and words exchanged in one."""
+
+
+def put(text, *words):
+    """Return a text with words exchanged that stand in it: each old, then new."""
+    for old, new in zip(words[::2], words[1::2], strict=True):
+        assert old in text, old
+        text = text.replace(old, new)
+    return text
+
 
 COORDINATES = """\
 title = "Four-bar from joint coordinates"

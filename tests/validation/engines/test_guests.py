@@ -256,7 +256,7 @@ def test_the_reason_of_a_dead_program_is_the_line_that_says_why(errors, line):
 
 
 def test_a_torque_that_is_a_hundredth_off_fails_alone(tmp_path):
-    by_engine = judged(SCENE, write_program(tmp_path, "off", OFF))
+    by_engine = judged(SCENE, write_program(tmp_path, "off", *OFF))
     assert failing(by_engine["off"]) == {"torque", "torque_inertia"}
     assert others_agree(by_engine)
 
@@ -267,7 +267,7 @@ def test_a_torque_that_is_a_hundredth_off_fails_alone(tmp_path):
 def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark):
     monkeypatch.setattr(programs, "WORKER_MEMORY", 2 * 10**8)
     replaced = {name: pair for name, (pair, _) in PROGRAMS.items()} | FINE
-    entries = [write_program(tmp_path, name, pair) for name, pair in replaced.items()]
+    entries = [write_program(tmp_path, name, *pair) for name, pair in replaced.items()]
     by_engine = judged(SCENE, *entries)
     assert others_agree(by_engine)
     for name in FINE:
@@ -288,7 +288,7 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark)
 def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, mark):
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setattr(programs, "MOST_ERRORS", 10**7)
-    entries = [write_program(tmp_path, name, pair) for name, pair in SILENT.items()]
+    entries = [write_program(tmp_path, name, *pair) for name, pair in SILENT.items()]
     began = time.monotonic()
     by_engine = judged(SCENE, *entries, seconds=3.0)
     assert time.monotonic() - began < 60.0 and others_agree(by_engine)
@@ -307,7 +307,7 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path):
     lives.write_text("x")
     taken = f"os.truncate({str(lives)!r}, n - 1); os.kill(os.getpid(), 9)"
     old, dies = after_hello(f"n = os.path.getsize({str(lives)!r})", f"if n: {taken}")
-    unlucky = write_program(tmp_path, "unlucky", (old, dies + LAST))
+    unlucky = write_program(tmp_path, "unlucky", old, dies + LAST)
     assert verdicts(judged(SCENE, unlucky)["unlucky"]) == {AGREES}
     assert not lives.stat().st_size
 
@@ -444,12 +444,12 @@ def test_names_stand_apart():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "entry, part",
-    [
-        ("no such program", "the command line of a program that is there"),
-        ("'", "is no command line"),
-        ("no.such:Class", "ModuleNotFoundError"),
-        (HERE + "Absent", "AttributeError"),
-    ],
+    read_rows("""
+no such program | the command line of a program that is there
+' | is no command line
+no.such:Class | ModuleNotFoundError
+tests.support.hostile_class:Absent | AttributeError
+"""),
 )
 def test_what_is_not_there_is_refused_in_one_line(entry, part):
     with pytest.raises(fourbar.InputError) as error:
@@ -461,12 +461,12 @@ def test_what_is_not_there_is_refused_in_one_line(entry, part):
 @pytest.mark.usefixtures("hosted")
 @pytest.mark.parametrize(
     "name, reason",
-    [
-        ("Nameless", "engine"),
-        ("Loose", "tolerance"),
-        ("Else", "answers"),
-        ("Misspelt", "effects = 'spring': must be among gravity, "),
-    ],
+    read_rows("""
+Nameless | engine
+Loose | tolerance
+Else | answers
+Misspelt | effects = 'spring': must be among gravity,
+"""),
 )
 def test_a_hello_that_fails_is_one_failing_row(name, reason):
     by_engine = judged(SCENE, name)
@@ -534,7 +534,7 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suit
     for factor, said in (("1.0", []), ("1.0", kept), ("1.01", again)):
         (tmp_path / "near.py").write_text(NEAR.replace("FACTOR", factor))
         assert run_once() == said
-    write_program(tmp_path, "program", OFF)
+    write_program(tmp_path, "program", *OFF)
     assert run_once() == again
 
 

@@ -65,6 +65,7 @@ from tests.support.robots import (
     notes_of,
 )
 from tests.support.rows import read_rows
+from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 SCENE = fourbar.load(MODELS / "crank_rocker.toml")
@@ -145,14 +146,6 @@ def worst_error(scene, examined, how=FILE_AT_ONE_STATE):
     return max(errors(scene, examined, how).values())
 
 
-def put(text, *pairs):
-    """Return a text with parts replaced that stand in it."""
-    for old, new in pairs:
-        assert old in text, old
-        text = text.replace(old, new)
-    return text
-
-
 FIRST, SECOND = re.findall("    <general [^>]*load_[^>]*/>\n", GENERATED)
 SERVO = '<velocity name="servo" joint="O2" kv="10"/></actuator>'
 EQUALITY = '<joint joint1="O2" joint2="O4"/></equality>'
@@ -163,11 +156,11 @@ RIGHT = {
         {"plane"},
     ),
     "loads under other names and in another order": (
-        put(GENERATED, (FIRST + SECOND, SECOND + FIRST), ("load_1", "couple")),
+        put(GENERATED, FIRST + SECOND, SECOND + FIRST, "load_1", "couple"),
         set(),
     ),
     "a servo and another equality": (
-        put(GENERATED, ("</actuator>", SERVO), ("</equality>", EQUALITY)),
+        put(GENERATED, "</actuator>", SERVO, "</equality>", EQUALITY),
         {"other equalities"},
     ),
 }
@@ -254,7 +247,7 @@ def described(text, scene=CRANK_ROCKER):
 def planted(what):
     """Return the generated file with one of the edits; flags let it act."""
     (old, new) = next(edit[1:3] for edit in EDITS if edit[0] == what)
-    text = put(GENERATED, (old, new)) if new else re.sub(old + "[^>]*>", "", GENERATED)
+    text = put(GENERATED, old, new) if new else re.sub(old + "[^>]*>", "", GENERATED)
     flags = {"range": "limit", "contype": "contact"}
     off = ["damper", *(flag for word, flag in flags.items() if word in new)]
     return re.sub(f'({"|".join(off)})="disable"', "", text)
@@ -352,7 +345,7 @@ sprung | </actuator> | <motor tendon="spring_1"/><motor joint="A"/></actuator> |
 def test_a_cause_is_named_and_nothing_else(name, old, new, keys):
     scene = SPRUNG if name == "sprung" else CRANK_ROCKER
     text = write_mjcf(scene)
-    theirs = described(put(text, (old, new)), scene)
+    theirs = described(put(text, old, new), scene)
     listed = find_differences(described(text, scene), theirs)
     assert ", ".join(sorted(one.key for one in listed)) == keys
 
@@ -438,7 +431,7 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
     """
     scene, right, names, _ = SPOILT[group]
     key, *edit = entry
-    text = put(right, edit)
+    text = put(right, *edit)
     spoilt = examine_text(scene, text, **names)
     one = differences(scene, spoilt)[key]
     rows = rows_of(scene, answers_of(spoilt))
@@ -556,7 +549,7 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for():
         '<position name="ram" tendon="cylinder" kp="400" kv="3" gear="2" ctrlrange="-1'
         ' 1" forcerange="-1 1"/>'
     )
-    for mine in (text, put(text, (driven, servo))):
+    for mine in (text, put(text, driven, servo)):
         examined = examine_text(scene, mine)
         assert any("gives the cylinder's force" in note for note in notes_of(examined))
         for how, most in zip(BOTH, (1e-9, 1e-6), strict=True):
@@ -565,10 +558,10 @@ def test_a_cylinder_of_ones_own_is_what_the_force_is_solved_for():
             for name in ("drive_force", "F12", "F43", "F14"):
                 assert of_file[name] < most
     start = 'name="cylinder_end" pos="'
-    moved = examine_text(scene, put(text, (start + "0.0", start + "0.1")))
+    moved = examine_text(scene, put(text, start + "0.0", start + "0.1"))
     assert errors(scene, moved)["drive_force"] > 1e-2
     assert any(key.startswith("tendons.") for key in differences(scene, moved))
-    without = examine_text(scene, put(text, (driven, "")))
+    without = examine_text(scene, put(text, driven, ""))
     assert errors(scene, without)["drive_force"] < 1e-9
 
 

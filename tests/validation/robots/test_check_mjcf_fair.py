@@ -48,6 +48,7 @@ from tests.support.robots import (
     read_scene,
 )
 from tests.support.scenes import find_angle
+from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
@@ -129,14 +130,15 @@ def written(text, folder):
 def test_what_stands_in_for_a_missing_mesh_touches_nothing(tmp_path):
     """Two bars have one at the same pin, in a file whose contacts act."""
     mesh = '<geom type="mesh" mesh="m" mass="0"/>'
-    text = write_mjcf(BARE)
-    for old, new in (
-        ("<worldbody>", '<asset><mesh name="m" file="m.stl"/></asset><worldbody>'),
-        ('<site name="O2"', f'{mesh}<site name="O2"'),
-        ('<site name="A"', f'{mesh}<site name="A"'),
-    ):
-        assert text.count(old) == 1
-        text = text.replace(old, new)
+    text = put(
+        write_mjcf(BARE),
+        "<worldbody>",
+        '<asset><mesh name="m" file="m.stl"/></asset><worldbody>',
+        '<site name="O2"',
+        f'{mesh}<site name="O2"',
+        '<site name="A"',
+        f'{mesh}<site name="A"',
+    )
     report = judge_path("bare", BARE, written(text, tmp_path))
     assert report.counts.status == 0
 

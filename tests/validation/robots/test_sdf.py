@@ -2,6 +2,7 @@
 
 import math
 import re
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -26,6 +27,7 @@ from tests.support.robots import (
 )
 from tests.support.rows import read_rows
 from tests.support.scenes import meet_circles
+from tests.support.texts import put
 from tests.validation.robots.test_files import TETRAHEDRON
 
 AGREES = 1e-9
@@ -104,118 +106,96 @@ def write_box(length):
     )
 
 
-def put(*changes, text=PLAIN):
-    """Return a file with texts replaced that stand in it once."""
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    return text
-
-
-OF_INNER = [
-    (pin, pin.replace(">rod<", ">inner::rod<")) for pin in (PIN_OF_CRANK, CLOSING)
-]
+changed = partial(put, PLAIN)
+"""The plain file with other words."""
+OF_INNER = (
+    PIN_OF_CRANK,
+    PIN_OF_CRANK.replace(">rod<", ">inner::rod<"),
+    CLOSING,
+    CLOSING.replace(">rod<", ">inner::rod<"),
+)
 """The rod is that of a model within the model."""
 STATED = {
     "plain": PLAIN,
-    "turned out of its plane, gravity too": put(
-        (
-            '<model name="linkage">',
-            '<model name="linkage"><pose degrees="true">1 2 3 90 0 30</pose>',
-        ),
-        ("<gravity>0 -9.81 0<", "<gravity>0 0 -9.81<"),
+    "turned out of its plane, gravity too": changed(
+        '<model name="linkage">',
+        '<model name="linkage"><pose degrees="true">1 2 3 90 0 30</pose>',
+        "<gravity>0 -9.81 0<",
+        "<gravity>0 0 -9.81<",
     ),
-    "joints from the other side": put(
-        (
-            "<parent>crank</parent><child>rod</child>",
-            f"<parent>rod</parent><child>crank</child><pose>{A} 0 0 0 0 0</pose>",
-        ),
+    "joints from the other side": changed(
+        "<parent>crank</parent><child>rod</child>",
+        f"<parent>rod</parent><child>crank</child><pose>{A} 0 0 0 0 0</pose>",
     ),
-    "frames, degrees": put(
-        (
-            f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
-            '<pose relative_to="turned"/>',
-        ),
-        (
-            PIN_OF_CRANK,
-            f'{PIN_OF_CRANK}<frame name="end" attached_to="crank"><pose>{A} 0 0 0 0 0'
-            '</pose></frame><frame name="turned" attached_to="end">'
-            '<pose degrees="true">'
-            f"0 0 0 0 0 {math.degrees(ROD - START)}</pose></frame>",
-        ),
-        (
-            "<parent>world</parent><child>crank</child>",
-            "<parent>world</parent><child>foot</child>",
-        ),
-        (CRANK, f'{CRANK}<frame name="foot" attached_to="crank"/>'),
+    "frames, degrees": changed(
+        f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
+        '<pose relative_to="turned"/>',
+        PIN_OF_CRANK,
+        f'{PIN_OF_CRANK}<frame name="end" attached_to="crank"><pose>{A} 0 0 0 0 0'
+        '</pose></frame><frame name="turned" attached_to="end">'
+        '<pose degrees="true">'
+        f"0 0 0 0 0 {math.degrees(ROD - START)}</pose></frame>",
+        "<parent>world</parent><child>crank</child>",
+        "<parent>world</parent><child>foot</child>",
+        CRANK,
+        f'{CRANK}<frame name="foot" attached_to="crank"/>',
     ),
-    "placed by a joint": put(
-        (
-            f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
-            f'<pose relative_to="B">{-C} 0 0 0 0 0</pose>',
-        ),
-        (
-            f"<pose>{B} 0 0 0 0 0</pose>",
-            f'<pose relative_to="rod">{B} 0 0 0 0 {ROCKER - ROD}</pose>',
-        ),
+    "placed by a joint": changed(
+        f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
+        f'<pose relative_to="B">{-C} 0 0 0 0 0</pose>',
+        f"<pose>{B} 0 0 0 0 0</pose>",
+        f'<pose relative_to="rod">{B} 0 0 0 0 {ROCKER - ROD}</pose>',
     ),
-    "quaternion": put(
-        (
-            f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
-            f'<pose rotation_format="quat_xyzw">{D} 0 0 0 0 {math.sin(ROCKER / 2)} '
-            f"{math.cos(ROCKER / 2)}</pose>",
-        )
+    "quaternion": changed(
+        f"<pose>{D} 0 0 0 0 {ROCKER}</pose>",
+        f'<pose rotation_format="quat_xyzw">{D} 0 0 0 0 {math.sin(ROCKER / 2)} '
+        f"{math.cos(ROCKER / 2)}</pose>",
     ),
-    "nested model": put(
-        (
-            COUPLER,
-            f'<model name="inner"><pose>0 0 0 0 0 0.3</pose>{COUPLER}</model>'.replace(
-                f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}",
-                f"{(PIN_A * np.exp(-0.3j)).real} {(PIN_A * np.exp(-0.3j)).imag} "
-                f"0 0 0 {ROD - 0.3}",
-            ),
+    "nested model": changed(
+        COUPLER,
+        f'<model name="inner"><pose>0 0 0 0 0 0.3</pose>{COUPLER}</model>'.replace(
+            f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}",
+            f"{(PIN_A * np.exp(-0.3j)).real} {(PIN_A * np.exp(-0.3j)).imag} "
+            f"0 0 0 {ROD - 0.3}",
         ),
         *OF_INNER,
     ),
-    "included, placed by a frame": put(
-        (
-            COUPLER,
-            "<include><uri>model://rod</uri><name>inner</name><pose>"
-            f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose><placement_frame>start"
-            "</placement_frame></include>",
-        ),
+    "included, placed by a frame": changed(
+        COUPLER,
+        "<include><uri>model://rod</uri><name>inner</name><pose>"
+        f"{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose><placement_frame>start"
+        "</placement_frame></include>",
         *OF_INNER,
     ),
-    "ball constraint": put(
-        ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
-        (
-            CLOSING,
-            "<drake:ball_constraint><drake:ball_constraint_body_A>rod"
-            "</drake:ball_constraint_body_A><drake:ball_constraint_body_B>rocker"
-            f"</drake:ball_constraint_body_B><drake:ball_constraint_p_AP>{B} 0 0"
-            f"</drake:ball_constraint_p_AP><drake:ball_constraint_p_BQ>{C} 0 0"
-            "</drake:ball_constraint_p_BQ></drake:ball_constraint>",
-        ),
+    "ball constraint": changed(
+        "<sdf ",
+        '<sdf xmlns:drake="http://drake.mit.edu" ',
+        CLOSING,
+        "<drake:ball_constraint><drake:ball_constraint_body_A>rod"
+        "</drake:ball_constraint_body_A><drake:ball_constraint_body_B>rocker"
+        f"</drake:ball_constraint_body_B><drake:ball_constraint_p_AP>{B} 0 0"
+        f"</drake:ball_constraint_p_AP><drake:ball_constraint_p_BQ>{C} 0 0"
+        "</drake:ball_constraint_p_BQ></drake:ball_constraint>",
     ),
-    "auto-inertials": put(
-        *((write_inertial(length), write_box(length)) for length in (A, B, C))
-    ),
-    "inertia in a turned frame": put(
-        (
-            f"<pose>{B / 2} 0 0 0 0 0</pose><mass>{make_bar(B).mass}</mass>"
-            f"<inertia><ixx>1</ixx><iyy>1</iyy><izz>{make_bar(B).inertia}</izz>",
-            f"<pose>{B / 2} 0 0 {math.pi / 2} 0 0</pose><mass>{make_bar(B).mass}</mass>"
-            f"<inertia><ixx>1</ixx><izz>1</izz><iyy>{make_bar(B).inertia}</iyy>",
+    "auto-inertials": changed(
+        *(
+            write(length)
+            for length in (A, B, C)
+            for write in (write_inertial, write_box)
         )
     ),
-    "axis in another frame": put(
-        (
-            PIN_OF_CRANK,
-            PIN_OF_CRANK.replace(
-                "<xyz>0 0 1</xyz>", '<xyz expressed_in="lying">0 -1 0</xyz>'
-            )
-            + f'<frame name="lying"><pose>5 5 5 {math.pi / 2} 0 0</pose></frame>',
-        ),
+    "inertia in a turned frame": changed(
+        f"<pose>{B / 2} 0 0 0 0 0</pose><mass>{make_bar(B).mass}</mass>"
+        f"<inertia><ixx>1</ixx><iyy>1</iyy><izz>{make_bar(B).inertia}</izz>",
+        f"<pose>{B / 2} 0 0 {math.pi / 2} 0 0</pose><mass>{make_bar(B).mass}</mass>"
+        f"<inertia><ixx>1</ixx><izz>1</izz><iyy>{make_bar(B).inertia}</iyy>",
+    ),
+    "axis in another frame": changed(
+        PIN_OF_CRANK,
+        PIN_OF_CRANK.replace(
+            "<xyz>0 0 1</xyz>", '<xyz expressed_in="lying">0 -1 0</xyz>'
+        )
+        + f'<frame name="lying"><pose>5 5 5 {math.pi / 2} 0 0</pose></frame>',
     ),
 }
 
@@ -259,7 +239,7 @@ B | rocker | rod | Ro | Rb
         text += f"<child>{child}</child><drake:parent_frame>{at_parent}"
         text += f"</drake:parent_frame><drake:child_frame>{at_child}"
         text += f"</drake:child_frame>{AXIS}</joint>"
-    return put((MODEL, f'<model name="linkage">{text}</model>'))
+    return changed(MODEL, f'<model name="linkage">{text}</model>')
 
 
 def write_halves():
@@ -268,12 +248,11 @@ def write_halves():
     half = COUPLER.replace(f"<mass>{rod.mass}", f"<mass>{rod.mass / 2.0}")
     half = half.replace(f"<izz>{rod.inertia}", f"<izz>{rod.inertia / 2.0}")
     weld = "<parent>rod</parent><child>shadow</child></drake:weld_constraint>"
-    return put(
-        (COUPLER, half + half.replace('"rod"', '"shadow"')),
-        (
-            CLOSING,
-            CLOSING.replace(">rod<", ">shadow<") + f"<drake:weld_constraint>{weld}",
-        ),
+    return changed(
+        COUPLER,
+        half + half.replace('"rod"', '"shadow"'),
+        CLOSING,
+        CLOSING.replace(">rod<", ">shadow<") + f"<drake:weld_constraint>{weld}",
     )
 
 
@@ -301,8 +280,8 @@ LOOP_JOINT = (
     f'<loop_joint name="B" type="spherical"><link1 link="rod" xyz="{B} 0 0" rpy="0 0 0"'
     f'/><link2 link="rocker" xyz="{C} 0 0" rpy="0 0 0"/></loop_joint>'
 )
-STATED["a prefix that nothing binds"] = put(
-    ('<model name="linkage">', '<model name="linkage" gz:kind="12:30 a:b">')
+STATED["a prefix that nothing binds"] = changed(
+    '<model name="linkage">', '<model name="linkage" gz:kind="12:30 a:b">'
 )
 STATED["loop joint of a URDF"] = write_urdf(LOOP_JOINT)
 GRAVITY = '<mujoco><compiler/><option gravity="0 -9.81 0"/></mujoco>'
@@ -345,16 +324,22 @@ def test_torque_and_pin_forces_are_those_of_the_bars(way, tmp_path):
         np.testing.assert_allclose(size, ours, atol=AGREES * ours.max(), rtol=0.0)
 
 
-def compile_text(folder, text):
-    robot = compile_robot(read(folder, text))
-    return robot.model, robot.notes
+@pytest.fixture
+def compiled(tmp_path):
+    """Compiles a text: the model, and the notes on it."""
+
+    def compile_text(text):
+        robot = compile_robot(read(tmp_path, text))
+        return robot.model, robot.notes
+
+    return compile_text
 
 
 @pytest.mark.parametrize("way", ["plain", "joints from the other side"])
-def test_angles_of_a_joint_turn_the_child_against_the_parent(way, tmp_path):
+def test_angles_of_a_joint_turn_the_child_against_the_parent(way, compiled):
     text = STATED[way].replace(CLOSING, "").replace('"A" type="revolute"', UNIVERSAL)
     text = text.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
-    model, _ = compile_text(tmp_path, text)
+    model, _ = compiled(text)
     data = mujoco.MjData(model)
     angles = (0.2, 0.3)
     relative = []
@@ -368,18 +353,14 @@ def test_angles_of_a_joint_turn_the_child_against_the_parent(way, tmp_path):
     np.testing.assert_allclose(relative[1], expected, atol=AGREES)
 
 
-def closes(folder, text):
-    return compile_text(folder, text)[0].eq(0).name
-
-
-def test_the_joint_farthest_from_the_world_closes_the_loop(tmp_path):
-    last = put((PIN_OF_CRANK, ""), (CRANK, PIN_OF_CRANK + CRANK))
-    assert closes(tmp_path, last) == "B"
+def test_the_joint_farthest_from_the_world_closes_the_loop(compiled):
+    last = changed(PIN_OF_CRANK, "", CRANK, PIN_OF_CRANK + CRANK)
+    assert compiled(last)[0].eq(0).name == "B"
     both = last.replace(CLOSING, "").replace(CRANK, CLOSING + CRANK)
-    assert closes(tmp_path, both) in ("A", "B")
+    assert compiled(both)[0].eq(0).name in ("A", "B")
     mimic = '<mimic joint="O2"><multiplier>0</multiplier></mimic></axis>'
     follows = CLOSING.replace("</axis>", mimic)
-    assert compile_text(tmp_path, put((CLOSING, follows)))[0].eq("A").id == 0
+    assert compiled(changed(CLOSING, follows))[0].eq("A").id == 0
 
 
 DAMPED = "<dynamics><damping>0.1</damping></dynamics></axis>"
@@ -405,7 +386,7 @@ def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
         "<child>shadow</child></joint>"
     )
     on_shadow = CLOSING.replace(">rod<", ">shadow<") + halves
-    text = put((COUPLER, COUPLER + shadow), (CLOSING, on_shadow))
+    text = changed(COUPLER, COUPLER + shadow, CLOSING, on_shadow)
     for pin, more in kinds.items():
         start = text.index(f'<joint name="{pin}"')
         text = text[:start] + text[start:].replace("</axis>", more, 1)
@@ -418,13 +399,13 @@ def test_the_joint_that_loses_least_closes_the_loop(kinds, closing, tmp_path):
     assert lost == ([] if closing == "halves" else ["range" * (closing in kinds)])
 
 
-def test_a_tensor_is_turned_with_its_frame(tmp_path):
+def test_a_tensor_is_turned_with_its_frame(compiled):
     stated = (
         "<inertial><pose>0 0 0 0.3 0.4 0.5</pose><mass>1</mass><inertia><ixx>2</ixx>"
         "<iyy>3</iyy><izz>4</izz><ixy>0.1</ixy><ixz>0.2</ixz><iyz>0.3</iyz></inertia>"
         "</inertial>"
     )
-    model, _ = compile_text(tmp_path, put((write_inertial(A), stated)))
+    model, _ = compiled(changed(write_inertial(A), stated))
     body = model.body("crank")
     principal = Rotation.from_quat(body.iquat, scalar_first=True).as_matrix()
     turned = Rotation.from_euler("xyz", (0.3, 0.4, 0.5)).as_matrix()
@@ -458,17 +439,17 @@ def test_a_tensor_is_turned_with_its_frame(tmp_path):
     [(1000.0, ""), (500.0, "<density>500</density>")],
 )
 def test_auto_inertials_are_volumes_by_densities(
-    shape, volume, density, stated, tmp_path
+    shape, volume, density, stated, tmp_path, compiled
 ):
     (tmp_path / "rod").mkdir()
     (tmp_path / "rod" / "part.obj").write_text(TETRAHEDRON)
     collision = f"<collision name='c'>{stated}<geometry>{shape}</geometry>"
     text = f'<inertial auto="true"/>{collision}</collision>'
-    model, _ = compile_text(tmp_path, put((write_inertial(A), text)))
+    model, _ = compiled(changed(write_inertial(A), text))
     assert model.body("crank").mass[0] == approx(density * volume, rel=1e-7)
 
 
-def test_numbers_of_a_joint_are_those_of_its_file(tmp_path):
+def test_numbers_of_a_joint_are_those_of_its_file(compiled):
     axis = (
         "<axis><xyz>0 0 1</xyz><dynamics><damping>0.1</damping><friction>0.2</friction>"
         "<spring_stiffness>0.3</spring_stiffness><spring_reference>0.4"
@@ -476,15 +457,15 @@ def test_numbers_of_a_joint_are_those_of_its_file(tmp_path):
         "</limit></axis>"
     )
     joint = CLOSING.replace(AXIS, axis)
-    text = put(
-        (CLOSING, joint),
-        (
-            "<gravity>",
-            "<physics><max_step_size>0.002</max_step_size></physics><gravity>",
-        ),
-        ('<link name="rod">', '<link name="rod"><gravity>false</gravity>'),
+    text = changed(
+        CLOSING,
+        joint,
+        "<gravity>",
+        "<physics><max_step_size>0.002</max_step_size></physics><gravity>",
+        '<link name="rod">',
+        '<link name="rod"><gravity>false</gravity>',
     )
-    model, notes = compile_text(tmp_path, text)
+    model, notes = compiled(text)
     number = model.joint("B").id  # what would lose its damping closes no loop
     assert model.dof_damping[number] == 0.1
     assert model.dof_frictionloss[number] == 0.2
@@ -509,10 +490,10 @@ universal | A A::axis2 | 2
 screw |  | 6
 """),
 )
-def test_joints_of_each_type_leave_its_freedoms(kind, names, freedoms, tmp_path):
+def test_joints_of_each_type_leave_its_freedoms(kind, names, freedoms, compiled):
     joint = PIN_OF_CRANK.replace("revolute", kind)
     joint = joint.replace(AXIS, f"{AXIS}<axis2><xyz>1 0 0</xyz></axis2>")
-    model, notes = compile_text(tmp_path, put((PIN_OF_CRANK, joint), (CLOSING, "")))
+    model, notes = compiled(changed(PIN_OF_CRANK, joint, CLOSING, ""))
     assert model.nv == 2 + int(freedoms)
     joints = [model.joint(number).name for number in range(model.njnt)]
     assert [name for name in joints if name[0] == "A"] == names.split()
@@ -526,31 +507,28 @@ def start_at(axis, angle):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
+def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path, compiled):
     """All links are drawn along the ground; the positions alone tell the assembly."""
     turned = [sign * angle for angle in (START, ROD - START, ROCKER)]
     text = put(
-        (f"<pose>0 0 0 0 0 {START}</pose>", ""),
-        (
-            f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
-            f"<pose>{A} 0 0 0 0 0</pose>",
-        ),
-        (f"0 0 0 0 {ROCKER}</pose>", "0 0 0 0 0</pose>"),
-        (PIN_OF_CRANK, start_at(PIN_OF_CRANK, turned[1])),
-        (
-            f"<child>crank</child>{AXIS}",
-            f"<child>crank</child>{start_at(AXIS, turned[0])}",
-        ),
-        (
-            f"<child>rocker</child>{AXIS}",
-            f"<child>rocker</child>{start_at(AXIS, turned[2])}",
-        ),
-        text=STATED["ball constraint"],
+        STATED["ball constraint"],
+        f"<pose>0 0 0 0 0 {START}</pose>",
+        "",
+        f"<pose>{PIN_A.real} {PIN_A.imag} 0 0 0 {ROD}</pose>",
+        f"<pose>{A} 0 0 0 0 0</pose>",
+        f"0 0 0 0 {ROCKER}</pose>",
+        "0 0 0 0 0</pose>",
+        PIN_OF_CRANK,
+        start_at(PIN_OF_CRANK, turned[1]),
+        f"<child>crank</child>{AXIS}",
+        f"<child>crank</child>{start_at(AXIS, turned[0])}",
+        f"<child>rocker</child>{AXIS}",
+        f"<child>rocker</child>{start_at(AXIS, turned[2])}",
     )
     (closure,) = report_of(read(tmp_path, text)).closures
     (gap,) = re.findall(r"gap (\S+) mm", closure.text)
     assert 1e-3 * float(gap) == approx(0.0, abs=AGREES * D)
-    model, _ = compile_text(tmp_path, text)
+    model, _ = compiled(text)
     assert [model.joint(name).qpos0[0] for name in ("O2", "A", "O4")] == turned
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -560,10 +538,10 @@ def test_a_loop_begins_at_the_initial_positions_of_its_joints(sign, tmp_path):
     )
 
 
-def test_a_slide_begins_at_its_initial_position(tmp_path):
+def test_a_slide_begins_at_its_initial_position(compiled):
     joint = PIN_OF_CRANK.replace("revolute", "prismatic")
-    text = put((PIN_OF_CRANK, start_at(joint, 0.07)), (CLOSING, ""))
-    model, _ = compile_text(tmp_path, text)
+    text = changed(PIN_OF_CRANK, start_at(joint, 0.07), CLOSING, "")
+    model, _ = compiled(text)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     assert data.body("rod").xpos[2] == approx(0.07, rel=AGREES)
@@ -571,7 +549,9 @@ def test_a_slide_begins_at_its_initial_position(tmp_path):
 
 
 @pytest.mark.parametrize("starts", [(0.0, 0.0), (0.2, 0.5)])
-def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path):
+def test_a_joint_follows_by_its_multiplier_offset_and_reference(
+    starts, tmp_path, compiled
+):
     """MuJoCo's own residual of the line is zero where SDF's line goes through."""
     mimic = (
         '<mimic joint="O2"><multiplier>-2</multiplier><offset>0.3</offset>'
@@ -579,12 +559,10 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
     )
     crank = f"<child>crank</child>{AXIS}"
     joint = start_at(PIN_OF_CRANK.replace("</axis>", mimic), starts[1])
-    text = put(
-        (PIN_OF_CRANK, joint), (crank, start_at(crank, starts[0])), (CLOSING, "")
-    )
+    text = changed(PIN_OF_CRANK, joint, crank, start_at(crank, starts[0]), CLOSING, "")
     (closure,) = report_of(read(tmp_path, text)).closures
     assert closure.reason.startswith("A follows O2, polycoef ")
-    model, _ = compile_text(tmp_path, text)
+    model, _ = compiled(text)
     data = mujoco.MjData(model)
     data.joint("O2").qpos[0] = 0.7
     data.joint("A").qpos[0] = -2.0 * (0.7 - 0.1) + 0.3
@@ -593,34 +571,34 @@ def test_a_joint_follows_by_its_multiplier_offset_and_reference(starts, tmp_path
 
 
 @pytest.mark.parametrize("stated", [True, False])
-def test_gravity_that_no_world_states_is_named(stated, tmp_path):
-    gravity = () if stated else [("<gravity>0 -9.81 0</gravity>", "")]
-    model, notes = compile_text(tmp_path, put(*gravity))
+def test_gravity_that_no_world_states_is_named(stated, compiled):
+    gravity = () if stated else ("<gravity>0 -9.81 0</gravity>", "")
+    model, notes = compiled(changed(*gravity))
     assert model.opt.gravity.tolist() == ([0, -9.81, 0] if stated else [0, 0, -9.8])
     named = "no <world> states gravity: SDFormat's own, 9.8 m/s^2, is taken" in notes
     assert named == (not stated)
 
 
-def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(tmp_path):
-    text = put(
-        ("<sdf ", '<sdf xmlns:drake="http://drake.mit.edu" '),
-        (CLOSING, "<drake:linear_bushing_rpy/>"),
+def test_a_bushing_is_left_out_with_the_pin_to_put_in_its_place(compiled):
+    text = changed(
+        "<sdf ",
+        '<sdf xmlns:drake="http://drake.mit.edu" ',
+        CLOSING,
+        "<drake:linear_bushing_rpy/>",
     )
-    notes = compile_text(tmp_path, text)[1]
+    notes = compiled(text)[1]
     assert "left out of the SDF: drake:linear_bushing_rpy" in notes
     assert any("put <drake:ball_constraint> in its place" in note for note in notes)
 
 
-def test_what_stands_and_what_floats(tmp_path):
+def test_what_stands_and_what_floats(compiled):
     alone = "<model name='{}'>{}<link name='part'/></model>"
     hinge = "<joint name='j' type='revolute'><parent>part</parent><child>{}</child>"
     idle = f"{hinge}{AXIS}</joint>"  # among what stands, and of a link on itself
     board = alone.format("board", "") + idle.format("board::part")
     shelf = alone.format("shelf", f"<static>1</static>{board}")
     models = shelf + alone.format("ball", idle.format("part"))
-    model, notes = compile_text(
-        tmp_path, put(("</world>", f"{models}<plugin/><light/></world>"))
-    )
+    model, notes = compiled(changed("</world>", f"{models}<plugin/><light/></world>"))
     names = {model.body(number).name for number in range(model.nbody)}
     assert {"shelf::part", "ball::part"} <= names
     assert model.body("shelf::part").weldid == 0
@@ -663,18 +641,18 @@ NOWHERE = "<include><uri>model://nowhere</uri>"
         (f"<mass>{make_bar(A).mass}</mass>", "<mass>-1</mass>", "above 0"),
     ],
 )
-def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, tmp_path):
-    text = put((old, new))
+def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, compiled):
+    text = changed(old, new)
     if message is None:
-        assert compile_text(tmp_path, text)[0].nbody == 1
+        assert compiled(text)[0].nbody == 1
         return
     with raises(fourbar.InputError, match=message):
-        compile_text(tmp_path, text)
+        compiled(text)
 
 
 def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
     path = tmp_path / "world.sdf"
-    path.write_text(put((CRANK, f"{CRANK}{NOWHERE}</include>")), encoding="utf-8")
+    path.write_text(changed(CRANK, f"{CRANK}{NOWHERE}</include>"), encoding="utf-8")
     file = read_robot(path)
     assert "models that are missing are left out: model://nowhere" in file.notes
     path.write_text(PLAIN, encoding="utf-8")
@@ -684,7 +662,7 @@ def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
 def test_a_step_beyond_the_end_of_a_motion_meets_no_stop(tmp_path):
     stops = "<limit><lower>-1</lower><upper>1</upper></limit></axis>"
     crank = f"<child>crank</child>{AXIS}"
-    file = read(tmp_path, put((crank, crank.replace("</axis>", stops))))
+    file = read(tmp_path, changed(crank, crank.replace("</axis>", stops)))
     examined = examine_text(read_scene(file, speed=1.0).scene, file)
     end = examined.measured.through_time.rows.joint.max()
     assert end > 1.0
@@ -737,11 +715,13 @@ CYCLE = '<joint name="last"><parent link="rod"/><child link="{}"/></joint>'
         (LOOP_JOINT, CYCLE.format("base"), "'last': closes a loop at rod and base"),
     ],
 )
-def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(old, new, said, tmp_path):
+def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(
+    old, new, said, tmp_path, compiled
+):
     text = write_urdf(LOOP_JOINT.replace(old, new))
     if "left out" not in said:
         with raises(fourbar.InputError, match=said):
-            compile_text(tmp_path, text)
+            compiled(text)
         return
     notes = read(tmp_path, text).notes
     told = " ".join(notes)
@@ -790,17 +770,17 @@ def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
     assert report.notes[: len(notes)] == notes
 
 
-def test_two_points_of_one_pin_are_two_connects(tmp_path):
+def test_two_points_of_one_pin_are_two_connects(compiled):
     """Drake's constraints have no names, and join the same two links twice."""
     for way in ("ball constraint of a URDF", "ball constraint"):
         text = STATED[way]
         start = text.index("<drake:ball_constraint>")
         stop = text.index("</drake:ball_constraint>") + len("</drake:ball_constraint>")
-        model, _ = compile_text(tmp_path, text[:stop] + text[start:])
+        model, _ = compiled(text[:stop] + text[start:])
         assert model.neq == 2
 
 
-def test_a_loop_joint_within_another_element_is_left_out(tmp_path):
+def test_a_loop_joint_within_another_element_is_left_out(compiled):
     text = write_urdf(f"<isaac>{LOOP_JOINT}</isaac>")
-    model, notes = compile_text(tmp_path, text)
+    model, notes = compiled(text)
     assert model.neq == 0 and "left out of the URDF: isaac" in notes

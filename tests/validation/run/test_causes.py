@@ -44,6 +44,7 @@ from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
 from tests.support.here import summary_of
 from tests.support.scenes import crank_rocker
+from tests.support.texts import put
 
 SCENE = crank_rocker(motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
 CAPABILITIES = MODELS / "capabilities"
@@ -59,12 +60,8 @@ def nothing(numbers, at):
 
 def make_guest(*words):
     """Return the page's engine with other words in its text: each old, then new."""
-    text = SOLVER
-    for old, new in zip(words[::2], words[1::2], strict=True):
-        assert old in text, old
-        text = text.replace(old, new)
     solver = {}
-    exec(text, solver)
+    exec(put(SOLVER, *words), solver)
 
     class Plain:
         name = "plain"
