@@ -10,7 +10,6 @@ from fourbar_lab import advice
 from fourbar_lab.cli import status as ended
 
 pytestmark = pytest.mark.slow
-RK4_ALONE = {("RK4", True): 1.0}
 
 
 @pytest.mark.parametrize("index", [9, 10])
@@ -18,7 +17,7 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
     """A linkage of the study `advice` is judged between the positions that the advice
     saw. These two ask for two digits, which a search finds in few steps.
     """
-    case = advice.measure_case(99, index, RK4_ALONE)
+    case = advice.measure_case(99, index, {("RK4", True): 1.0})
     assert case.met and case.cheap, case
 
 

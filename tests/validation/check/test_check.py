@@ -372,7 +372,6 @@ OF_A_BAR = {
 }
 WHOSE = (("bars.coupler", ("coupler",)), ("bars.*", ()))
 LENGTHS = {"ground": 1.01, "input": 0.98, "coupler": 1.001, "output": 0.95}
-FACTORS = {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}
 IN_THESIS = {
     "x and y exchanged": changed(lambda right: {"F32": right["F32"][:, ::-1]}),
     "other branch": solved(branch=np.full(12, -1, np.int8)),
@@ -388,7 +387,10 @@ IN_THESIS = {
     "I alpha in kg cm^2/s^2": inertial(1.0, 100.0),
     "bars.*.inertia reversed": inertial(1.0, -1.0),
     "m a and I alpha in kg mm/s^2": inertial(1e3, 1e3),
-    **{f"loads {done}": loads_times(x, x) for done, x in FACTORS.items()},
+    **{
+        f"loads {done}": loads_times(x, x)
+        for done, x in {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}.items()
+    },
     "loads.0.force 0.1 times ours": loads_times(0.1, 1.0),
     "theta_4 or": changed(lambda right: {"theta_4": right["theta_4"] + math.pi}),
     "relative to bar 3": relative_to("theta_3"),
@@ -697,7 +699,6 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, c
     assert check(scene, f"theta_2,torque\n1.0,{torque}\n")[0] == code
 
 
-STRAIGHT = Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))
 REFUSED_MOTIONS = [
     (
         {
@@ -707,7 +708,10 @@ REFUSED_MOTIONS = [
         },
         "not judged while released",
     ),
-    ({"law": STRAIGHT}, "at the scene's own positions"),
+    (
+        {"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))},
+        "at the scene's own positions",
+    ),
     ({"theta_2": [0.1, 0.2], "omega_2": [1.0, 2.0]}, "motion.omega_2: a table"),
 ]
 
@@ -941,8 +945,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(re
     assert judgement.status == HOLDS and judgement.compared > 100
 
 
-STANDING = OURS.motion.replace(speed=None, acceleration=0.0)
-WITHOUT_SPEED = replace(OURS, motion=STANDING)
+WITHOUT_SPEED = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
 
 
 @pytest.mark.slow

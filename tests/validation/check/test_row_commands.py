@@ -227,8 +227,10 @@ torque | torque | torque | 1 | .15g
 """)
 }
 """Name of a column, what is in it, its heading, a factor and how it is written."""
-RISE = fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")
-SERVO = crank_rocker(motion=Motion(law=RISE), title="Servo")
+SERVO = crank_rocker(
+    motion=Motion(law=fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")),
+    title="Servo",
+)
 
 
 def follow_rise(time):

@@ -46,8 +46,6 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, ga
         assert row.verdict == AGREES and row.allowed < 1e-12 / gap, quantity
 
 
-STANDING = {"speed": 0.0, "acceleration": 0.0}
-DRY = (fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))
 JUDGED = {
     "with its inertia": (
         (2, 4),
@@ -58,8 +56,8 @@ JUDGED = {
     "positions alone": ((3, 4), {"speed": None}, {}, {"stroke", "drive_line"}),
     "statics and friction at rest": (
         (1, 3),
-        STANDING,
-        {"effects": DRY},
+        {"speed": 0.0, "acceleration": 0.0},
+        {"effects": (fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))},
         {"drive_force_low", "drive_force_high"},
     ),
 }

@@ -32,7 +32,6 @@ from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 from tests.support.shares import slow_but
 
-TABLE = Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0))
 SPRINGS = read_rows("""
 1 0.1 -1.5 | 4 0.08 0.2 | 200 0.05 3 |
 2 0.05 0.5 | 3 0.1 0.3 | 50 0.05 1 |
@@ -78,7 +77,7 @@ ACTING = {
         arm=(0.05, 1.0),
         moment=0.2,
         frame="world",
-        table=TABLE,
+        table=Table((0.0, 1.0, 2.5, 2 * np.pi), (0.0, 1.0, -0.5, 0.0)),
     ),
 }
 ON_TREES = {"pinocchio-inverse", "mujoco-inverse"}

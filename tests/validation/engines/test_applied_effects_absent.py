@@ -55,9 +55,6 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     assert not model.jnt_limited.any()
 
 
-SAME = [1.0, 1.0, 1.0]
-
-
 @pytest.mark.parametrize(
     "motion, note",
     [
@@ -66,7 +63,7 @@ SAME = [1.0, 1.0, 1.0]
             "mujoco-simulated: the commanded speed is 0: nothing moves through time",
         ),
         ((1.0, 2.0), "mujoco-simulated: a simulation needs more than one position"),
-        ((SAME, 2.0), "positions: all are the same, one is evaluated"),
+        (([1.0, 1.0, 1.0], 2.0), "positions: all are the same, one is evaluated"),
     ],
 )
 def test_what_does_not_move_through_time_is_not_simulated(motion, note):

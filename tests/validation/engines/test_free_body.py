@@ -119,7 +119,6 @@ def test_a_lever_of_an_upright_rectangle(drive, forces):
 SPRING = Springs(
     (Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05, 3.0),)
 )
-TORSION = Torsion.at(O4=(2.0, 1.9, 0.1))
 
 
 def test_over_a_turn_what_stores_energy_gives_it_back():
@@ -133,7 +132,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
         scene = crank_rocker(
             motion=fourbar.Motion(turn, 10.0),
             loads=(),
-            effects=(Gravity(), SPRING, TORSION),
+            effects=(Gravity(), SPRING, Torsion.at(O4=(2.0, 1.9, 0.1))),
             drive_bar=bar,
         )
         got = answered(scene)

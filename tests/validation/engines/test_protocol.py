@@ -28,13 +28,10 @@ from fourbar_validation.scenes.suites import Random
 from tests.support.rows import read_rows
 from tests.support.scenes import bare, crank_rocker
 
-FILES = sorted(MODELS.rglob("*.toml"))
-RANDOM = (Random(40, 3, tuple(DrawnType)), Random(40, 3, ()))
-
 
 def scenes():
-    yield from (fourbar.load(file) for file in FILES)
-    for suite in (*RANDOM, Hard()):
+    yield from (fourbar.load(file) for file in sorted(MODELS.rglob("*.toml")))
+    for suite in (Random(40, 3, tuple(DrawnType)), Random(40, 3, ()), Hard()):
         yield from (suite.scene(index) for index in range(len(suite)))
 
 

@@ -626,7 +626,6 @@ def test_the_run_itself_is_written_as_junit(tmp_path, monkeypatch, call):
 
 HELD = changed(engine="mine", quantity="F32")
 FAILED_ROW = replace(HELD, error=1e-3, verdict=FAILS)
-SILENT = replace(FAILED_ROW, quantity="all")
 DATES = [f"2026-01-0{night}T02:00:00+00:00" for night in (1, 2, 3, 4)]
 RUNS = [
     f"the run of {date[:19].replace('T', ' ')} at commit c{night}"
@@ -684,7 +683,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
 ROWS = {
     "held": HELD,
     "fails": FAILED_ROW,
-    "silent": SILENT,
+    "silent": replace(FAILED_ROW, quantity="all"),
     "F43": replace(HELD, quantity="F43"),
     "theirs": replace(FAILED_ROW, engine="theirs"),
     "b": replace(FAILED_ROW, scene="b"),

@@ -96,7 +96,6 @@ SPRUNG = replace(
     effects=(Gravity(), Torsion.at(O4=(0.3, 0.4, 0.0)), Springs((SPRING,))),
 )
 STILL_SPRUNG = replace(SPRUNG, motion=STILL.motion)
-TORQUE_AND_PINS = ("torque", *PIN_FORCES)
 BOTH = (FILE_AT_ONE_STATE, FILE_THROUGH_TIME)
 STIFF = 'solref="0.02 1" solimp="0.9999 0.9999 0.001 0.5 2"'
 FLOOR = 1e-4
@@ -442,7 +441,7 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
     else:
         (mended,) = mend(scene, text, names, [(key, one.generated)])
         priced = price(one, rows, rows_of(scene, mended))
-    worst = max(errors(scene, spoilt)[name] for name in TORQUE_AND_PINS)
+    worst = max(errors(scene, spoilt)[name] for name in ("torque", *PIN_FORCES))
     assert (answer is None) == key.startswith(("pins.", "tendons."))
     assert priced.cost == approx(worst, rel=1e-2, abs=FLOOR)
 

@@ -288,7 +288,6 @@ def test_what_the_file_does_not_tell_is_stated_or_left_out(
         measure_mimic(path, "j3", COUPLER_SCENE, angles={"j3": "1 deg"})
 
 
-FINGER = """<robot name="finger"><link name="palm"/>{}{}</robot>"""
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="0.02"/>
 <inertia ixx="1e-6" ixy="0" ixz="0" iyy="3e-6" iyz="0" izz="3e-6"/></inertial></link>
 <joint name="{0}_j" type="continuous"><origin xyz="{2} 0 0" rpy="0 0 {3}"/>
@@ -322,7 +321,7 @@ def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
     prox = LINK.format("prox", near, 0.0, begin, "")
     dist = LINK.format("dist", far, ground, end, follow)
     path = tmp_path / "finger.urdf"
-    path.write_text(FINGER.format(prox, dist))
+    path.write_text(f'<robot name="finger"><link name="palm"/>{prox}{dist}</robot>')
     motion = fourbar.Motion(np.radians(np.linspace(60.0, 110.0, 51)), 1.0)
     scene = Scene(FourBar(ground, *map(Bar, moving)), motion)
     report = measure_mimic(path, "dist_j", scene)

@@ -535,7 +535,6 @@ WEIGHTS = tuple(
 )
 ARM, FROM_PIN = with_load(arm=PLACE), with_load(from_pin=PLACE)
 AT_PIN = {"from_pin": (0.0, 0.0)}
-FROM_B = cmath.polar(0.22 + cmath.rect(*PLACE))
 OTHER_SCENES = {
     "loads.0 (bar 3): its force acts at the second pin of the bar": (
         with_load(3, from_pin=PLACE),
@@ -569,7 +568,7 @@ OTHER_SCENES = {
     "loads.0 (bar 4): its place is measured from the bar's second pin, not from its"
     " first": (
         FROM_PIN,
-        with_load(from_pin=FROM_B),
+        with_load(from_pin=cmath.polar(0.22 + cmath.rect(*PLACE))),
     ),
     "effects.springs.0.length 1.3 times ours (fitted)": (
         with_springs(DRAWN),

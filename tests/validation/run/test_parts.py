@@ -19,7 +19,6 @@ from fourbar_validation.run.store import Store
 from tests.support.here import judge_here
 
 OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
-TABLES = ("results.csv", "results.parquet")
 
 
 @pytest.fixture(autouse=True)
@@ -67,7 +66,7 @@ def test_a_run_over_all_parts_in_one_folder_writes_the_report(run):
     assert not (out / "request.json").exists() and not (out / "parts").exists()
     whole = Path(run("whole"))
     assert (out / "report.html").is_file()
-    for name in TABLES:
+    for name in ("results.csv", "results.parquet"):
         assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 

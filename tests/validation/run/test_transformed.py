@@ -48,7 +48,6 @@ LOADS = (
     ),
     Load(2, (1.0, 2.0), from_pin=(0.04, -0.6)),
 )
-AT_A_POINT = PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
 SCENES = {
     "everything": crank_rocker(loads=LOADS, effects=EVERYTHING),
     "arm": crank_rocker(),
@@ -59,7 +58,9 @@ SCENES = {
     "drive on the coupler": crank_rocker(loads=LOADS, drive_bar=3),
     "drive on the output": crank_rocker(loads=LOADS, drive_bar=4),
     "cylinder": crank_rocker(loads=LOADS, drive=ON_COUPLER),
-    "point": crank_rocker(loads=LOADS, drive=AT_A_POINT),
+    "point": crank_rocker(
+        loads=LOADS, drive=PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
+    ),
     "bar 4 commanded": crank_rocker(
         motion=Motion(theta_4=Sweep(2.3, 2.8, 12), omega_4=2.0),
         loads=LOADS,

@@ -38,7 +38,6 @@ DRAG_LINK, DOUBLE_ROCKER, TRIPLE_ROCKER = (
     fourbar.load(MODELS / f"{name}.toml")
     for name in ("drag_link", "double_rocker", "triple_rocker")
 )
-RANGE = Sweep(math.radians(86.618), math.radians(363.382), 180)
 SCENES = {
     "crank-rocker": crank_rocker(motion=Motion(TURN, 10.0, 5.0)),
     "backwards": crank_rocker(motion=Motion(TURN, -10.0)),
@@ -48,7 +47,7 @@ SCENES = {
     "drag link, drive on bar 3": replace(DRAG_LINK, drive_bar=3),
     "double rocker": DOUBLE_ROCKER,
     "triple rocker": TRIPLE_ROCKER,
-    "thesis": thesis(RANGE),
+    "thesis": thesis(Sweep(math.radians(86.618), math.radians(363.382), 180)),
 }
 
 

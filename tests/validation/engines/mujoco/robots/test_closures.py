@@ -127,7 +127,6 @@ def test_five_hinges_are_a_four_bar_once_one_is_held():
 
 SPRUNG = ONE_MOTOR.replace('joint name="c"', 'joint name="c" stiffness="2"')
 TWO_MOTORS = FIVE_BAR.format(more='<motor name="two" joint="c"/>')
-NO_NAME = ONE_MOTOR.replace('<joint name="d"', "<joint")
 
 COAXIAL = ONE_MOTOR.replace('pos="0.02 0 0.12"', 'pos="0 0 0"')
 TWICE_COAXIAL = COAXIAL.replace('pos="0 0 0.1"', 'pos="0 0 0"')
@@ -143,7 +142,7 @@ TWICE_COAXIAL = COAXIAL.replace('pos="0 0 0.1"', 'pos="0 0 0"')
         (ADAPTIVE, "--hold spring_link (or "),
         (SPRUNG, "--hold c (or b or d)"),
         (TWO_MOTORS, "--hold a (or c) makes it a four-bar"),
-        (NO_NAME, "--hold b (or c or joint 3)"),
+        (ONE_MOTOR.replace('<joint name="d"', "<joint"), "--hold b (or c or joint 3)"),
         (COAXIAL, "freedoms; --hold c (or d) makes it a four-bar"),
         (TWICE_COAXIAL, "freedoms: no hold makes it a four-bar"),
     ],

@@ -16,7 +16,6 @@ FORCES = {
     "F14": np.array([1.0, 100.0]),
 }
 """Pin forces of a well-conditioned state and of one beside a change point."""
-CONDITIONS = np.array([0.9, 0.01])
 
 
 @pytest.mark.parametrize(
@@ -35,7 +34,7 @@ def test_what_vanishes_is_judged_by_the_largest_pin_force(torque, scale):
     grow.
     """
     sizes = {"torque": np.array(torque), **FORCES}
-    scales = find_scales(sizes, CONDITIONS, 0.5)
+    scales = find_scales(sizes, np.array([0.9, 0.01]), 0.5)
     assert scales["torque"] == approx(scale)
     assert scales["F43"] == approx(3000.0)
     for name in ("F12", "F32", "F14"):
