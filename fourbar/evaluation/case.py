@@ -36,8 +36,9 @@ without asking the system for fresh pages, and from 10 000 on OpenBLAS starts th
 for the squares by which `withhold_infinite` looks for what is no number.
 """
 NEEDS_DIGITS = 32.0 * U
-"""A factor of Heron's formula smaller than this times its terms is evaluated in many
-digits: in doubles it is wrong by at most about 12 U times them.
+"""A factor of Heron's formula smaller than this times the square of the sum of the
+lengths is evaluated in many digits: in doubles it is wrong by at most about 24 U times
+that, and one within 8 U of it is a limit.
 """
 LARGEST_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the
@@ -46,17 +47,6 @@ nominal linkage by more is a linkage of its own.
 _NO_POSITIONS = np.empty(0, dtype=np.intp)
 _NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
-
-
-def _needs_many_digits(factor: Any, constant: Any, size: Any) -> Any:
-    """Mark where doubles cannot decide the sign of a factor of Heron's formula.
-
-    The factor is a constant and 4 a d times a square; where the constant is not
-    negative both are positive and nothing cancels.
-
-    `size`: 4 a d.
-    """
-    return (constant < 0.0) & (abs(factor) < NEEDS_DIGITS * (abs(constant) + size))
 
 
 def _condense_branch(branch: NDArray[np.int8]) -> Any:
@@ -314,13 +304,11 @@ class Case(NamedTuple):
         close: Any = remainder is not None
         if remainder is None:
             factors = ((half.outer, lengths.E1), (half.inner, lengths.E2))
+            small = NEEDS_DIGITS * (lengths.a + lengths.b + lengths.c + lengths.d) ** 2
             for factor, constant in factors:
+                # a sum of positive terms loses nothing
                 if is_any(constant < 0.0):
-                    close = close | _needs_many_digits(
-                        factor,
-                        constant,
-                        4.0 * lengths.a * lengths.d,
-                    )
+                    close = close | ((constant < 0.0) & (abs(factor) < small))
         if not is_any(close):
             return half, _NO_POSITIONS
         from fourbar.formulas.many_digits import decide_half_angles

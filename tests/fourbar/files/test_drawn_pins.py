@@ -172,7 +172,7 @@ def test_what_is_drawn_at_its_limit_is_singular_there(commanded):
         x, y, *other = random.integers(20, 90, 4).tolist()
         A, other = complex(x, y), complex(*other)
         pins = {
-            "theta_2": (0.0, A, A + other, A + 3.0 * other),
+            "theta_2": (0.0, A, A + 200.0 * other, A + 600.0 * other),
             "theta_3": (0.0, A, other + 2.0 * A, other),
             "theta_4": (0.0, A, -2.0 * A, other),
             "stroke": (0.0, A, A + other, 1.0),
