@@ -79,16 +79,13 @@ class Study:
     def begin(self, case: Case, rows: slice) -> Case:
         """Return the case of some members whose effects begin with their motions.
 
-        A motion begins where the member first assembles. Those of one that assembles
-        nowhere or changes its branch begin nowhere.
+        A motion begins where the member first assembles, and keeps its branch.
         """
         motion = take_positions(self.at, rows, slice(None))
         half, _ = case.half_angle(motion)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         first = np.argmax(assembled, axis=1)[:, None]
-        begins = assembled.any(axis=1) & (np.ptp(motion.branch, axis=1) == 0)
-        angle = np.take_along_axis(motion.angle, first, axis=1)
-        start = np.where(begins[:, None], angle, np.nan)
+        start = np.take_along_axis(motion.angle, first, axis=1)
         return case.begin_at(Command(start, motion.branch[:, :1], 0.0, 0.0, motion.bar))
 
 

@@ -166,6 +166,7 @@ def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
 Flywheel | [1, 3] | effects.flywheel.bar
 Torsion | [[["A", 0, 1, 0]]] | effects.torsion.A.stiffness
 PinFriction | [[["C", 0.1, 0.1]]] | effects.pin_friction.C
+Viscous | [[["O2", 0.1], ["O2", 0.2]]] | effects.viscous.O2
 PinFriction | [[["A", -0.1, 0.1]]] | effects.pin_friction.A.coefficient
 Table | [[0, 1, 7], [1, 1, 1]] | loads.table.theta_2
 Table | [[0, 1, 1], [1, 1, 2]] | loads.table.theta_2
