@@ -99,11 +99,9 @@ def evaluate(
     if "condition" in wanted:
         values["condition"] = values["condition"] * command.condition
     codes = _find_codes_of_loop(case.path, state, command)
-    missing = codes == NOT_ASSEMBLED
-    if is_any(missing):
-        # points of the commanded bar, and the stroke of a cylinder on it, would go on
-        stated = {*COMMAND_NAMES[command.bar], *command.names}
-        _blank(values, values.keys() - stated, missing)
+    # points of the commanded bar, and the stroke of a cylinder on it, would go on
+    stated = {*COMMAND_NAMES[command.bar], *command.names}
+    _blank(values, values.keys() - stated, codes == NOT_ASSEMBLED)
     if last_stage < FORCE:
         return Evaluated(codes, values, state)
     dynamics = case.dynamics(state, command.acceleration, case.impending)
@@ -116,21 +114,20 @@ def evaluate(
         of_effects = np.max(stated_codes, axis=0)
         codes = np.where(codes == OK, of_effects, codes).astype(np.uint8)
     if is_any(codes > SINGULAR):
-        everywhere = np.isin(codes, _WITHOUT_FORCES)
-        of_pins = {*PIN_FORCES, "force_error"}
+        of_forces = forces.keys() - {"drive_condition"}
+        of_pins = of_forces & {*PIN_FORCES, "force_error"}
         if any(term.loaded_pins for term in case.terms):
-            of_pins |= forces.keys()  # the drive balances friction of those forces
-        _blank(forces, forces.keys() - {"drive_condition"}, everywhere)
-        at_change_points = codes == CHANGE_POINT
-        _blank(
-            forces, (forces.keys() & of_pins) - {"drive_condition"}, at_change_points
-        )
+            of_pins = of_forces  # the drive balances friction of those forces
+        _blank(forces, of_forces, np.isin(codes, _WITHOUT_FORCES))
+        _blank(forces, of_pins, codes == CHANGE_POINT)
     values |= {name: value for name, value in forces.items() if name in wanted}
     return Evaluated(codes, values, state)
 
 
 def _blank(values: dict[str, Any], names: Iterable[str], missing: Any) -> None:
     """Put NaN in place of the named values where a mask holds."""
+    if not is_any(missing):
+        return
     for name in names:
         value = values[name]
         nothing = complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan
@@ -318,43 +315,42 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
     From that stage on the quantities become NaN.
     """
     code, values, state = evaluated
-    # an overflow of a square, or of the sum, is looked at too
-    total: Any = 0.0
-    for value in values.values():
-        total += np.vdot(value, value) if isinstance(value, np.ndarray) else value
-    if cmath.isfinite(total):
+    # where the sum of squares overflows, each number is looked at
+    suspects = [
+        name
+        for name, value in values.items()
+        if not cmath.isfinite(np.vdot(value, value))
+    ]
+    if not suspects:
         return
-    # True where the two bars that are not driven are in line: no finite forces hold
-    # them in balance
-    in_line: Any = False
+    has_motion = (code != NOT_ASSEMBLED) & (code != SINGULAR)
+    has_forces = (code == OK) | (code == SEVERAL)
+    # number of the first stage that fails, at each position
+    first = np.full(code.shape, len(STAGES))
+    for name in suspects:
+        infinite = ~np.isfinite(values[name])
+        _blank(values, [name], infinite)
+        stage = _find_stage(name)
+        fails = infinite & (has_forces if stage >= FORCE else has_motion)
+        first[fails] = np.minimum(first[fails], stage)
+    gone = first < len(STAGES)
+    if not gone.any():
+        return
+    code[gone] = OVERFLOW
     if case.drive is None:
+        # where the two bars that are not driven are in line, no finite forces hold
+        # them in balance
         sine = case.path.drive_sine(state.position, case.drive_bar)
         in_line = np.abs(sine) <= NO_DIGIT_LEFT
-    in_line = np.broadcast_to(in_line, code.shape)
-    gone = np.zeros(code.shape, dtype=bool)
-    for stage in STAGES:
-        of_forces = stage in STAGES[3:]
-        promised = ~np.isin(code, (NOT_ASSEMBLED, SINGULAR))
-        if of_forces:
-            promised = np.isin(code, (OK, SEVERAL))
-        names = [name for name in values if _find_stage(name) == stage]
-        infinite = np.zeros_like(gone)
-        for name in names:
-            is_infinite = ~np.isfinite(values[name])
-            infinite |= is_infinite
-            _blank(values, [name], is_infinite)
-        infinite &= promised & ~gone
-        code[infinite] = OVERFLOW
-        if of_forces:
-            code[infinite & in_line] = NO_TORQUE
-        gone |= infinite
-        _blank(values, {*names} - {"drive_condition"}, gone)
+        code[gone & (first >= FORCE) & in_line] = NO_TORQUE
+    for name in values.keys() - {"drive_condition"}:
+        _blank(values, [name], first <= _find_stage(name))
 
 
-def _find_stage(name: str) -> str:
-    """Return the stage of a quantity, also of the scene's points."""
+def _find_stage(name: str) -> int:
+    """Return the number of a quantity's stage, also of the scene's points."""
     of_point = POINT_STAGES.get(name[:2], "position")
-    return STAGE_OF.get(name, of_point)
+    return STAGES.index(STAGE_OF.get(name, of_point))
 
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
