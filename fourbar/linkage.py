@@ -179,7 +179,7 @@ class Declared(NamedTuple):
 
     @property
     def units(self) -> tuple[str, str]:
-        """Units of both numbers of a pair."""
+        """Units of both numbers of a pair; that of one number twice."""
         return self.unit, self.pair or self.unit
 
     @property
@@ -383,7 +383,8 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     Raises an InputError that says what is allowed.
     """
     try:
-        size, other = value
+        pair: Any = None if isinstance(value, str | dict) else value
+        size, other = pair
     except (TypeError, ValueError):
         form = f"must be a pair like [{_show(*by.units)}]"
         raise InputError(key, value, form) from None

@@ -526,9 +526,8 @@ class Session:
         for pin, (x, y) in zip(PINS, asked["pins"], strict=True):
             written_x = write_rounded(float(x), grain, unit)
             pins[pin] = (written_x, write_rounded(float(y), grain, unit))
-        drawn = write_drawn_scene(pins)
         is_first = self.fresh
-        text = drawn if is_first else self.now.text
+        text = write_drawn_scene(pins) if is_first else self.now.text
         picture = self.now.plain.get("picture")
 
         def alter(document: SceneDocument) -> None:

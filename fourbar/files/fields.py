@@ -147,9 +147,10 @@ class Entry:
             x, y = (self[axis].check(Declared(by.unit)) for axis in "xy")
             value = convert_to_polar(x, y)
         numbers = value if isinstance(value, list) else [value]
-        for number, unit in zip(numbers, cycle(getattr(by, "units", ["1"]))):
-            if unit != "1" and isinstance(number, self.UNSTATED):
-                raise self.holding(number).refuse(self.FORM.format(name_unit(unit)))
+        entries = self.entries() if isinstance(value, list) else [self]
+        for entry, unit in zip(entries, cycle(getattr(by, "units", ["1"]))):
+            if unit != "1" and type(entry.value) in self.UNSTATED:
+                raise entry.refuse(self.FORM.format(name_unit(unit)))
         if DRAWN_WORD in numbers:
             name = self.key.removeprefix("motion.").partition(".")[0]
             drawn = self.file.drawn.get(name, DRAWN_WORD)
@@ -158,7 +159,15 @@ class Entry:
         try:
             return by.check(self.key, value)
         except InputError as error:
-            raise self.holding(error.value).refuse(error.allowed) from None
+            wrong = self.holding(error.value)
+            for entry in entries:
+                if entry.value == error.value:
+                    wrong = entry
+                    break
+            allowed = error.allowed
+            if wrong.value == DRAWN_WORD and not self.file.drawn:
+                allowed += f'; "{DRAWN_WORD}" needs [pins]'
+            raise wrong.refuse(allowed) from None
 
     def declared(self, by: Declared) -> Any:
         """Read a number, or a pair of numbers, which may be left out."""
@@ -269,7 +278,11 @@ class Entry:
         if name is not None:
             if name not in [*bars]:
                 known = ", ".join(bars) or "none"
-                allowed = f"must be a point of [points], which has {known}"
+                allowed = (
+                    f"must be a point of [points], which has {known}; the first pin of"
+                    ' a bar is from_pin = ["0 m", "0 deg"], the second has its length'
+                    " in place of 0"
+                )
                 raise self["point"].refuse(allowed)
             if of_bar.value is None:
                 of_bar.value = bars[name]

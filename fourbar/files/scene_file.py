@@ -320,7 +320,10 @@ def _read_bar(bar: Entry, length: float, number: int) -> Bar:
         known["centre"] = bar["centre"].locate(number)
     read: Bar = bar.holding(stated).described(Bar, **known)
     if not math.isfinite(read.moment_of_inertia):
-        raise bar["mass"].refuse("must leave the inertia m L^2/12 a finite number")
+        by = next(
+            key for key in ("mass", "mass_per_length", "density") if key in stated
+        )
+        raise bar[by].refuse("must leave the inertia m L^2/12 a finite number")
     return read
 
 

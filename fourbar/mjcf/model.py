@@ -68,7 +68,7 @@ class Settings:
     flywheel: float = 1e8
 
     def count_steps(self, turned: float, width: float) -> float:
-        """Return the least number of steps, a real number, of a turn of the input.
+        """Return the least number of steps, a real number, of a motion of the input.
 
         Parameters
         ----------
@@ -197,11 +197,12 @@ def require_carriable(linkage: FourBar) -> None:
     for number in MOVING_BARS:
         bar = linkage.bar(number)
         if bar.length < LEAST_LENGTH:
+            least = write_in_units("m", LEAST_LENGTH)
             allowed = (
-                f"must be at least {LEAST_LENGTH:g}: the compiler of MuJoCo takes a"
-                " nearer site for its body's origin"
+                f"must be at least {least}: the compiler of MuJoCo takes a nearer site"
+                " for its body's origin"
             )
-            name = f"bars.{BAR_NAMES[number]}.length"
+            name = f"lengths.{BAR_NAMES[number]}"
             raise InputError(name, bar.length, allowed, unit="m")
         for key, value, unit in (
             ("mass", bar.mass, "kg"),

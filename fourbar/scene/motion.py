@@ -573,7 +573,9 @@ class Motion(Described):
         Raises InputError for a place without rates, where each angle has its own.
         """
         rates = self.speed, self.acceleration
-        if not self.has_rate_of_each or np.array_equal(places, self.angle):
+        if not self.has_rate_of_each or (
+            places.shape[-1:] == self.angle.shape and (places == self.angle).all()
+        ):
             return rates
         rows = dict(zip(self.angle.tolist(), range(len(self.angle)), strict=True))
         chosen: Any = [*map(rows.get, places.ravel().tolist())]

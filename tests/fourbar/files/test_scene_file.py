@@ -79,7 +79,7 @@ mass = | radius_of_gyration = | write inertia = m k^2, or m (k^2 - r^2)
 gravity | gravitiy | effects.gravitiy | must be among gravity,
 { O2 = | { O3 = | effects.viscous.O3 | O2, A, B, O4
 "0.1 m" | "48 kg" | lengths.input | 48 kg | does not convert to m
-"3 N" | "3 kg" | loads[0].force | 3 kg | N
+"3 N" | "3 kg" | loads[0].force[0] | 3 kg | N
 "10 rad/s" | "10 Hz" | motion.omega_2 | 10 Hz | "Hz" is not known
 "0.01 N m s/rad" | "0.01 N m s" | effects.viscous.O2 | N m s/rad
 "0.1 m" | 9 in | at line 4, column | in quotes, like "9 in"
@@ -100,13 +100,13 @@ output = "0.22 m"\n |  | lengths.output | missing
 force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
 ["3 N", "40 deg"] | "3 N" | loads[0].force | pair
 ["3 N", "40 deg"] | { x = "1 N" } | loads[0].force.y | is missing
-["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force | no finite number | "1 rad"
-["3 N", "40 deg"] | ["3 N", 40] | loads[0].force = 40 | the unit is missing | "1 rad"
+["3 N", "40 deg"] | ["3 N", "down"] | loads[0].force[1] | no finite number | "1 rad"
+["3 N", "40 deg"] | ["3 N", 40] | loads[0].force[1] = 40 | the unit is missing | "1 rad"
 ["3 N", "40 deg"] | { x = "1e308 N", y = "1.5e308 N" } | loads[0].force = inf | finite
 force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | moment
 "60 deg" | "60" | motion.theta_2 | the unit is missing
-"60 deg" | "drawn" | motion.theta_2 = 'drawn' | like "1 rad"
-"60 deg" | ["1 deg", 2] | motion.theta_2 = 2 | like "1 rad"
+"60 deg" | "drawn" | motion.theta_2 = 'drawn' | "drawn" needs [pins]
+"60 deg" | ["1 deg", 2] | motion.theta_2[1] = 2 | like "1 rad"
 "60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known
 [[loads]] | [loads] | loads | [[loads]]
 "60 deg" | "0 deg to 360 deg" | motion.theta_2 | steps = 360 }

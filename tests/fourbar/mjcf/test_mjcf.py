@@ -208,7 +208,7 @@ def test_massless_bar_is_refused_in_one_line(mass, inertia):
 
 def test_a_bar_so_short_that_the_compiler_would_open_the_loop_is_refused():
     short = FourBar(0.3, Bar(0.1, 1.0), Bar(9e-7, 1.0), Bar(0.22, 1.0))
-    with raises(InputError, match=r"^bars\.coupler\.length = 9e-07 m: [^\n]*$"):
+    with raises(InputError, match=r"^lengths.coupler = 9e-07 m: [^\n]*$"):
         write_mjcf(crank_rocker(linkage=short))
 
 

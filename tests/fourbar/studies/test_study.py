@@ -266,3 +266,12 @@ def test_a_torsion_spring_is_followed_from_where_each_member_begins():
         assert study.status[row] == solve(alone).status
         assert "wound" in study.status[row]
     assert [status[0] == "ok" for status in study.status] == [False, False, True]
+
+
+def test_a_position_that_is_listed_twice_keeps_both_rates_in_every_member():
+    motion = Motion([0.1, 0.5, 0.1], [1.0, 2.0, -1.0], [3.0, 4.0, 5.0])
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
+    members = solve(vary(scene, {"lengths.input": [0.1, 0.1]}))
+    for name in ("omega_4", "alpha_4", "torque"):
+        alone = getattr(solve(scene), name)
+        assert (getattr(members, name) == alone).all()

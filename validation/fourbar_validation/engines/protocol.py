@@ -7,6 +7,7 @@ contract.
 """
 
 import math
+import re
 from collections.abc import Container, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -66,6 +67,10 @@ class _NumberEntry(Entry):
 
     UNSTATED = (str,)
     FORM = "must be a number, in {}"
+
+    def refuse(self, allowed: str) -> InputError:
+        """Make the error, in which a number has no unit beside it."""
+        return super().refuse(re.sub('"1 (.+?)"', r"1 (in \1)", allowed))
 
 
 def scene_to_json(scene: Scene) -> dict[str, Any]:
