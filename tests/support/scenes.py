@@ -122,6 +122,11 @@ def recommand(scene, **changes):
     return replace(scene, motion=scene.motion.replace(**changes))
 
 
+def relink(scene, **changes):
+    """Return a scene with parts of its linkage changed."""
+    return replace(scene, linkage=replace(scene.linkage, **changes))
+
+
 def low_parallelogram():
     """Return a parallelogram below its ground's line, beyond a change point.
 

@@ -6,7 +6,6 @@ What each is given, how a run is laid out, what is judged of its answer.
 import json
 import math
 import re
-from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -28,7 +27,7 @@ from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.environments import read_engines_of
 from tests.support.checkout import ROOT
-from tests.support.scenes import low_parallelogram
+from tests.support.scenes import low_parallelogram, recommand
 
 EXACT = 1e-10
 """Of single states of MuJoCo with the generated file; measured 2e-12."""
@@ -94,8 +93,7 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
         assert not re.search(formulas, path.read_text()), path
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
     for branch, first in ((1, math.tau), (-1, 0.0)):
-        turned = scene.motion.replace(branch=branch, speed=-10.0 * branch)
-        moved = replace(scene, motion=turned)
+        moved = recommand(scene, branch=branch, speed=-10.0 * branch)
         begin = protocol_engines.start(moved)
         assert write_mjcf(moved, start=begin).count("<key ") == 1
         assert "coupler" in write_sdf(moved, "drake", begin)

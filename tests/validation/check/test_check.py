@@ -16,7 +16,7 @@ from fourbar import Bar, Friction, Load, Motion, Sweep, Torsion
 from fourbar.cli import status as fourbar_status
 from fourbar.effects.load import Table
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
-from fourbar.quantities import OK, UNITS, VECTORS
+from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Scene, command, command_at
 from fourbar.scene.motion import Law
 from fourbar.solving import solve
@@ -29,7 +29,7 @@ from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows
-from tests.support.scenes import bare
+from tests.support.scenes import bare, recommand, relink
 from tests.support.shares import slow_but
 
 SCENES = {
@@ -37,16 +37,12 @@ SCENES = {
     for name in ("thesis", "crank_rocker", "drag_link")
 }
 OURS, THESIS = SCENES["crank_rocker"], SCENES["thesis"]
-SCENES["accelerating"] = replace(
-    OURS,
-    motion=OURS.motion.replace(acceleration=30.0),
-    linkage=replace(OURS.linkage, ground_angle=0.3),
-)
+ACCELERATING = recommand(OURS, acceleration=30.0)
+SCENES["accelerating"] = relink(ACCELERATING, ground_angle=0.3)
 MOMENT, FORCE = OURS.loads
 TURNING = replace(OURS, loads=(MOMENT, replace(FORCE, frame="world")))
 SCENES["load_in_the_world"] = TURNING
-FORCES = ("torque", "F12", "F32", "F43", "F14")
-PINS = FORCES[1:]
+FORCES = ("torque", *PIN_FORCES)
 ALL = ("theta_3", "theta_4", "omega_3", "omega_4", "alpha_3", "alpha_4", *FORCES)
 EVERY = 31
 """One position of so many is written."""
@@ -195,7 +191,7 @@ def units(*names, factor):
     return changed(lambda numbers: {name: factor * numbers[name] for name in names})
 
 
-def in_axes(degrees, of_y=1.0, names=PINS, factor=1.0):
+def in_axes(degrees, of_y=1.0, names=PIN_FORCES, factor=1.0):
     """State vectors in axes that are turned, whose y may be reversed."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     axes = factor * np.array([(c, -of_y * s), (s, of_y * c)])
@@ -245,7 +241,7 @@ def bars(change, *names):
 
     def change_linkage(scene):
         moving = {name: change(getattr(scene.linkage, name)) for name in names}
-        return replace(scene, linkage=replace(scene.linkage, **moving))
+        return relink(scene, **moving)
 
     return solved(change_linkage)
 
@@ -261,14 +257,11 @@ def centred(change):
     return change_bar
 
 
-def weigh(bar, mass=1.0, inertia=1.0):
+def scaled(mass=1.0, inertia=1.0):
     """Multiply mass and moment of inertia about G."""
-    inertia *= bar.moment_of_inertia
-    return replace(bar, mass=mass * bar.mass, inertia=inertia)
-
-
-def scaled(**factors):
-    return partial(weigh, **factors)
+    return lambda bar: replace(
+        bar, mass=mass * bar.mass, inertia=inertia * bar.moment_of_inertia
+    )
 
 
 def steiner(bar):
@@ -287,10 +280,6 @@ def opposite(planted):
     return less
 
 
-def about_end(bar):
-    return replace(bar, inertia=bar.mass * bar.length**2 / 3.0)
-
-
 def stretched(name, factor):
     """Change a length; bars keep mass, centre and inertia."""
 
@@ -301,7 +290,7 @@ def stretched(name, factor):
             bar = getattr(linkage, name)
             kept = {"centre": bar.mass_centre, "inertia": bar.moment_of_inertia}
             longer = replace(bar, length=factor * bar.length, **kept)
-        return replace(scene, linkage=replace(linkage, **{name: longer}))
+        return relink(scene, **{name: longer})
 
     return solved(change)
 
@@ -406,7 +395,7 @@ IN_CRANK_ROCKER = {
     "the sign is lost: sizes alone": changed(
         lambda right: {"torque": np.abs(right["torque"])}
     ),
-    "y reversed": units(*PINS, factor=(1.0, -1.0)),
+    "y reversed": units(*PIN_FORCES, factor=(1.0, -1.0)),
     "x reversed": units("F12", "F32", factor=(-1.0, 1.0)),
     "in axes turned by -90 deg": in_axes(-90.0),
     "in axes turned by 22.918 deg": in_axes(math.degrees(0.4)),
@@ -439,7 +428,9 @@ IN_CRANK_ROCKER = {
         )
         for who, names in WHOSE
     },
-    "bars.*.inertia 4 times ours": bars(about_end),
+    "bars.*.inertia 4 times ours": bars(
+        lambda bar: replace(bar, inertia=bar.mass * bar.length**2 / 3.0)
+    ),
     "bars.output.inertia 0.83 times ours": bars(scaled(inertia=0.83), "output"),
     "bars.coupler 1.2 times ours": bars(scaled(mass=1.2, inertia=1.2), "coupler"),
     "bars.coupler.mass 1.2 times ours": bars(scaled(mass=1.2), "coupler"),
@@ -491,11 +482,7 @@ MISTAKES = {
     "thesis": IN_THESIS,
     "crank_rocker": IN_CRANK_ROCKER,
     "accelerating": {
-        "ground_angle is left out": solved(
-            lambda scene: replace(
-                scene, linkage=replace(scene.linkage, ground_angle=0.0)
-            )
-        ),
+        "ground_angle is left out": solved(partial(relink, ground_angle=0.0)),
         "forces are in the frame of bar 1": in_axes(math.degrees(0.3)),
         "alpha_2 is left out": solved(acceleration=0.0),
         "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
@@ -621,7 +608,7 @@ OTHERS = {
     ),
     "ground_angle is left out": (
         STROKE,
-        solve(replace(STROKE, linkage=replace(STROKE.linkage, ground_angle=0.0))),
+        solve(relink(STROKE, ground_angle=0.0)),
     ),
     "effects.torsion.O4 left out": (
         replace(OURS, effects=(Torsion((("O4", 2.0, 1.0, 0.5),)),)),
@@ -651,8 +638,8 @@ def test_the_table_of_another_scene_is_explained(words, read):
 """),
 )
 def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check):
-    still = OURS.motion.replace(speed=0.0)
-    scene = replace(OURS, motion=still, effects=(Friction.at(O2=0.5),))
+    still = recommand(OURS, speed=0.0)
+    scene = replace(still, effects=(Friction.at(O2=0.5),))
     numbers = right(scene)
     columns = {
         "theta_2": numbers["theta_2"],
@@ -937,15 +924,17 @@ def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
 
 
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
-    parallelogram = fourbar.FourBar(0.3, Bar(0.1, 0.2), Bar(0.3, 0.5), Bar(0.1, 0.2))
-    scene = Scene(parallelogram, fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0))
+    scene = Scene(
+        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0),
+    )
     solution = fourbar.solve(scene)
     assert {*solution.branch.tolist()} == {1, -1}
     judgement = Judgement(scene, read(solution.to_csv()))
     assert judgement.status == HOLDS and judgement.compared > 100
 
 
-WITHOUT_SPEED = replace(OURS, motion=OURS.motion.replace(speed=None, acceleration=0.0))
+WITHOUT_SPEED = recommand(OURS, speed=None, acceleration=0.0)
 
 
 @pytest.mark.slow
@@ -1127,7 +1116,7 @@ def test_a_mistake_that_explains_less_than_nine_tenths_is_not_printed(
     alike, explained, judged
 ):
     """Ten columns differ, each by its sign or by chance."""
-    names = [*PINS, *ALL[:6]]
+    names = [*PIN_FORCES, *ALL[:6]]
     numbers = right(OURS)
     for name in names:
         reverse = name in names[:alike]

@@ -18,7 +18,7 @@ from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
 from tests.support.rows import read_rows
-from tests.support.scenes import CYLINDER, crank_rocker, meet_circles
+from tests.support.scenes import CYLINDER, crank_rocker, meet_circles, recommand
 
 SAME_PLACE = 1e-9
 """rad: a position by two circles and one by the formulas, 0.1 rad off a limit."""
@@ -77,12 +77,11 @@ def at_angles(angles):
 def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     scene = commanding(bar, *ends)
     angles = np.radians(np.linspace(*ends, 9 if same else 6))
-    at = replace(scene, motion=scene.motion.replace(angle=angles))
+    at = recommand(scene, angle=angles)
     solution = fourbar.solve(at)
     assert set(solution.status) == {"ok"}
     name = f"theta_{bar}"
-    fast = at.motion.replace(speed=2.0 * 30.0 / math.pi)
-    faster = fourbar.solve(replace(at, motion=fast))
+    faster = fourbar.solve(recommand(at, speed=2.0 * 30.0 / math.pi))
     torques = solution.torque, -solution.torque, faster.torque
     good, bad, slip = (judged(scene, name, angles, torque) for torque in torques)
     assert good.status == HOLDS and good.compared == len(angles)

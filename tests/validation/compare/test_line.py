@@ -3,8 +3,6 @@
 Every pair of bars holds, faults show, who cannot do it says so.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -20,7 +18,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, recommand
 from tests.validation.engines.test_engines import driven
 
 EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
@@ -68,8 +66,7 @@ JUDGED = {
 def test_what_is_stated_of_a_line_is_judged(what):
     pair, motion, acting, quantities = JUDGED[what]
     scene = driven(*pair, 1, **{"effects": (fourbar.Gravity(),)} | acting)
-    scene = replace(scene, motion=scene.motion.replace(**motion))
-    rows = judge("", scene, [FREE_BODY]).rows
+    rows = judge("", recommand(scene, **motion), [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
     agreeing = {row.quantity for row in rows if row.verdict == AGREES}
     assert quantities <= agreeing and "torque" not in agreeing

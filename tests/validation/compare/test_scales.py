@@ -16,7 +16,7 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar.solving import solve
 from fourbar_validation.compare.scales import Scale, scale_of, size_answer
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED, magnitude
-from tests.support.scenes import balance
+from tests.support.scenes import balance, recommand
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 
@@ -120,8 +120,7 @@ def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
 
 def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
     """Accelerations of mass centres that it lacks follow from its own motion."""
-    scene = balance(1e-2, 5.0)
-    scene = replace(scene, motion=scene.motion.replace(acceleration=40.0))
+    scene = recommand(balance(1e-2, 5.0), acceleration=40.0)
     solution = solve(scene)
     expected = size_answer(scene, solution)
     bare = replace(solution, a_G2=None, a_G3=None, a_G4=None)

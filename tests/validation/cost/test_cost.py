@@ -17,7 +17,7 @@ from pytest import approx, raises
 from scipy.interpolate import make_interp_spline
 
 import fourbar
-from fourbar.scene import command
+from fourbar.scene import command, command_at
 from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -36,7 +36,7 @@ from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.costs import point
-from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.scenes import CYLINDER, crank_rocker, recommand
 from tests.support.shares import slow_but
 
 
@@ -114,8 +114,7 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
 @pytest.mark.slow
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
-    bars = (fourbar.Bar(0.1, 0.2), fourbar.Bar(0.3, 0.6), fourbar.Bar(0.1, 0.2))
-    linkage = fourbar.FourBar(0.3, *bars)
+    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     sweep = fourbar.Sweep(math.radians(200.0), math.radians(340.0), 20)
     motion = fourbar.Motion(sweep, 10.0, branch=-1)
     scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
@@ -143,7 +142,7 @@ def test_what_is_no_number_or_not_compared_has_no_small_error():
     worst_errors = work_precision.compare_with_balls(scene, commanded, ours, balls)
     assert worst_errors.torque == worst_errors.F12 == worst_errors.F14 == math.inf
     assert worst_errors.F43 < 1e-13 and 1e-12 < worst_errors.F32 < 2e-9
-    still = replace(scene, motion=scene.motion.replace(speed=0.0), drive_bar=4)
+    still = replace(recommand(scene, speed=0.0), drive_bar=4)
     solution = fourbar.solve(still, "force")
     numbers = {name: solution[name] for name in ERROR_NAMES}
     assert compute_errors(still, command(still), numbers).torque == math.inf
@@ -364,11 +363,8 @@ def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
 def miss_between(scene, count, degree):
     """Return the worst error between samples where the driven bar is far from rest."""
     fine = np.linspace(0.0, 2.0 * math.pi, 4 * count + 1)
-    command_of_fine = command(scene)._replace(
-        angle=fine, branch=np.ones(fine.shape, np.int8)
-    )
-    exact = fourbar.solve(scene, at=command_of_fine)
-    speed = np.abs(exact.omega_4 if scene.drive_bar == 4 else np.ones(fine.shape))
+    exact = fourbar.solve(scene, at=command_at(scene, fine))
+    speed = np.abs(exact[f"omega_{scene.drive_bar}"])
     far = speed > 0.1 * speed.max()
     sampled = np.flatnonzero(far[::4])
     worst = 0.0

@@ -36,7 +36,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker, find_angle, thesis
+from tests.support.scenes import crank_rocker, find_angle, recommand, relink, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING, scene
 
@@ -186,9 +186,8 @@ def turn(lengths, **parts):
 
 
 def at_once(drive, branch):
-    case = scene(*ACTING)
-    motion = case.motion.replace(branch=branch, speed=-7.0)
-    return replace(case, drive_bar=drive, motion=motion)
+    case = recommand(scene(*ACTING), branch=branch, speed=-7.0)
+    return replace(case, drive_bar=drive)
 
 
 def driven(one, other, branch, effects):
@@ -519,5 +518,5 @@ def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angl
     folded = Scene(linkage, Motion(ground_angle, 1.0))
     closed = compute_directions(make_balls(folded, ground_angle), 1)
     assert abs(float(wedge(*closed[1:]).mid())) < 1e-60
-    apart = replace(folded, linkage=replace(folded.linkage, ground=3.0 - 1e-15))
+    apart = relink(folded, ground=3.0 - 1e-15)
     assert compute_directions(make_balls(apart, ground_angle), 1) is None

@@ -5,7 +5,6 @@ cases.
 """
 
 from collections import Counter
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -42,6 +41,7 @@ from fourbar_validation.published.thesis import (
     make_model_scene,
 )
 from tests.support.rows import read_rows
+from tests.support.scenes import recommand
 
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
@@ -279,9 +279,8 @@ def test_inputs_are_those_of_the_model():
     theirs = fourbar.load(MODELS / "thesis.toml")
     ours = make_model_scene(THETA_2)
     assert ours.effects == theirs.effects == ()
-    accelerated = {"angle": THETA_2, "acceleration": 7.0}
     one, other = (
-        fourbar.solve(replace(scene, motion=scene.motion.replace(**accelerated)))
+        fourbar.solve(recommand(scene, angle=THETA_2, acceleration=7.0))
         for scene in (ours, theirs)
     )
     for quantity in UNKNOWNS:

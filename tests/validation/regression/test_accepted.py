@@ -2,8 +2,6 @@
 machine.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -18,6 +16,7 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import read_default_suite
 from tests.support.here import EXACT
 from tests.support.runs import compare_rows, read_run
+from tests.support.scenes import recommand
 
 SUITE = read_default_suite()
 
@@ -56,8 +55,7 @@ def test_a_row_states_the_condition_that_its_allowance_comes_from(turns):
     name = "triple_rocker"
     scene = fourbar.load(MODELS / f"{name}.toml")
     if turns:
-        motion = scene.motion.replace(angle=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
-        scene = replace(scene, motion=motion)
+        scene = recommand(scene, angle=np.array([2.0, 3.0]) + turns * 2.0 * np.pi)
     # bars against their errors, and counts
     apart = {"torque_error", "force_error", "undecided", "status"}
     rows = [

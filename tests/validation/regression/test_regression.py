@@ -60,6 +60,7 @@ from tests.support.runs import (
     read_run,
     save_run,
 )
+from tests.support.scenes import relink
 from tests.support.shares import slow_but
 
 TIMES = "scene,engine,-,1,1,3.0\n"
@@ -409,9 +410,8 @@ def made(rows, scenes):
 
 def weighted(inertia, **changes):
     """The scene with another moment of inertia of its output."""
-    linkage = SCENE.linkage
-    output = replace(linkage.output, inertia=inertia)
-    return replace(SCENE, linkage=replace(linkage, output=output), **changes)
+    output = replace(SCENE.linkage.output, inertia=inertia)
+    return replace(relink(SCENE, output=output), **changes)
 
 
 OTHER, WRONG = changed(scene="other"), changed(error=1e-9, allowed=1e-8)

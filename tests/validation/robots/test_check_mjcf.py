@@ -65,12 +65,12 @@ from tests.support.robots import (
     notes_of,
 )
 from tests.support.rows import read_rows
+from tests.support.scenes import recommand
 from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 SCENE = fourbar.load(MODELS / "crank_rocker.toml")
-TURN = fourbar.Sweep(0.0, math.tau, 6)
-CRANK_ROCKER = replace(SCENE, motion=SCENE.motion.replace(angle=TURN))
+CRANK_ROCKER = recommand(SCENE, angle=fourbar.Sweep(0.0, math.tau, 6))
 GENERATED = write_mjcf(CRANK_ROCKER)
 NO_FILE = file_of("")
 MINE = {"input": "crank", "coupler": "rod", "output": "rocker"}
@@ -85,8 +85,7 @@ STILL = replace(
 )
 """The same at a speed of each position: no motion through time."""
 DRY = replace(
-    CRANK_ROCKER,
-    motion=SCENE.motion.replace(angle=fourbar.Sweep(0.6, 0.75, 6)),
+    recommand(SCENE, angle=fourbar.Sweep(0.6, 0.75, 6)),
     effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))),
 )
 SPRING = Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05)
@@ -682,10 +681,9 @@ def test_an_error_stands_before_that_of_the_generated_file():
 @pytest.mark.parametrize("turns", [-2, 1, 3])
 def test_a_loop_counts_the_whole_turns_of_its_scene(turns):
     """A spring of the file is wound as the angle of the scene says."""
-    motion = FEW.motion.replace(angle=FEW.motion.angle + math.tau * turns)
     loops = [
         find_loop_of_scene(file_of(GENERATED), scene, AS_DRAWN).loop
-        for scene in (FEW, replace(FEW, motion=motion))
+        for scene in (FEW, recommand(FEW, angle=FEW.motion.angle + math.tau * turns))
     ]
     one, other = (loop.angles[1] for loop in loops)
     assert other == approx(one + math.tau * turns)

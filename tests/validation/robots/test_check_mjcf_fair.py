@@ -47,7 +47,7 @@ from tests.support.robots import (
     notes_of,
     read_scene,
 )
-from tests.support.scenes import find_angle
+from tests.support.scenes import find_angle, recommand, relink
 from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -287,11 +287,8 @@ HEAVY = replace(BARE, effects=(fourbar.Gravity(),))
 
 
 def test_a_file_that_is_turned_against_gravity_is_not_the_same():
-    other = replace(
-        HEAVY,
-        linkage=replace(ARM, ground_angle=0.7),
-        motion=HEAVY.motion.replace(angle=HEAVY.motion.angle + 0.7),
-    )
+    moved = recommand(HEAVY, angle=HEAVY.motion.angle + 0.7)
+    other = relink(moved, ground_angle=0.7)
     examined = examine_text(HEAVY, write_mjcf(other, drive="none"))
     assert list_keys(HEAVY, examined, "gravity.") == ["gravity.x", "gravity.y"]
     assert error_of(HEAVY, examined, FILE_AT_ONE_STATE, "torque") > 0.1
@@ -370,35 +367,25 @@ def test_warnings_of_the_engine_are_notes_and_nothing_is_printed(
     assert not list(tmp_path.iterdir())
 
 
-def default_constraint(scene):
-    """The file of a scene without a drive, its loop closed by default.
-
-    MuJoCo closes it so where nothing is said.
-    """
-    text = write_mjcf(scene, replace(RECIPE, pad=None), drive="none")
-    closed, times = re.subn(
-        '(<connect [^>]*) solref="[^"]*" solimp="[^"]*"', r"\1", text
-    )
-    assert times == 1
-    return closed
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name, off",
     [("crank_rocker", 0.037), ("drag_link", 0.10), ("gallery/landing_gear", 0.88)],
 )
 def test_how_wrong_the_default_constraint_is_as_the_pages_say(name, off):
+    """Without a drive, the loop closed as MuJoCo does it where nothing is said."""
     scene = fourbar.load(MODELS / f"{name}.toml")
-    examined = examine_text(scene, default_constraint(scene))
-    assert error_of(scene, examined, FILE_AT_ONE_STATE, "torque") == approx(
-        off,
-        rel=0.05,
+    text = write_mjcf(scene, replace(RECIPE, pad=None), drive="none")
+    closed, times = re.subn(
+        '(<connect [^>]*) solref="[^"]*" solimp="[^"]*"', r"\1", text
     )
+    assert times == 1
+    error = error_of(scene, examine_text(scene, closed), FILE_AT_ONE_STATE, "torque")
+    assert error == approx(off, rel=0.05)
 
 
 PARALLELOGRAM = Scene(
-    FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1)),
+    fourbar.uniform(0.3, 0.1, 0.3, 0.1),
     fourbar.Motion(np.radians(np.linspace(10.0, 170.0, 33)), 2.0 * math.pi),
     effects=(fourbar.Gravity(),),
     title="a parallelogram near its change points",
@@ -446,7 +433,7 @@ def read_cut(cut):
     text = Planar(base="", drive="", cut=cut, equality=STIFF, more=option).text()
     scene = read_scene(text, speed=1.0).scene
     few = np.linspace(*command(scene).theta_2[[0, -1]], 5)
-    return replace(scene, motion=scene.motion.replace(angle=few)), file_of(text)
+    return recommand(scene, angle=few), file_of(text)
 
 
 @pytest.mark.parametrize("drive_bar", [2, 3])
@@ -455,10 +442,8 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     scene, file = read_cut("O4")
     in_pose = find_loop_of_scene(file, scene, AS_DRAWN).loop.angles[1]
     few = in_pose + np.linspace(-0.3, 0.3, 9)
-    moved = scene.motion.replace(angle=few)
-    there = solve(replace(scene, motion=moved), "position")
-    other = read_from_other_end(scene.settled())
-    other = replace(other, drive_bar=drive_bar)
+    there = solve(recommand(scene, angle=few), "position")
+    other = replace(read_from_other_end(scene.settled()), drive_bar=drive_bar)
     ways = [
         replace(other, motion=Motion(np.asarray(there.theta_4), 2.0, branch=branch))
         for branch in BRANCH_NAMES
@@ -482,7 +467,7 @@ def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too():
     """A file that has it is off from the formulas by what is predicted without them."""
     scene, file = read_cut("A")
     angles = np.linspace(*command(scene).theta_2[[0, -1]], 19)
-    scene = replace(scene, motion=scene.motion.replace(angle=angles, speed=10.0))
+    scene = recommand(scene, angle=angles, speed=10.0)
     left = predict_softness(scene, file, AS_DRAWN)
     answer = answer_of(examine_file(scene, file, AS_DRAWN), FILE_THROUGH_TIME)
     ours = solve(scene, "velocity", at=answer.at)

@@ -21,6 +21,7 @@ from fourbar_validation.robots.judge_mimic import (
     show_mimic,
 )
 from tests.support.rows import read_rows
+from tests.support.scenes import recommand
 from tests.validation.robots.test_sdf import URDF
 
 ROUND_OFF = 1e-12
@@ -102,8 +103,7 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
 
 def test_a_motion_through_a_change_point_is_refused(tmp_path):
     angles = np.radians(np.linspace(-30.0, 30.0, 61))
-    motion = PARALLELOGRAM.motion.replace(angle=angles)
-    through = replace(PARALLELOGRAM, motion=motion)
+    through = recommand(PARALLELOGRAM, angle=angles)
     with raises(InputError, match=r"'0 deg'.*change point"):
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
@@ -111,8 +111,7 @@ def test_a_motion_through_a_change_point_is_refused(tmp_path):
 def test_the_range_of_the_file_is_the_motion_of_a_scene_over_a_whole_turn(
     tmp_path, capsys
 ):
-    motion = PARALLELOGRAM.motion.replace(angle=np.linspace(0.0, math.tau, 73))
-    turn = replace(PARALLELOGRAM, motion=motion)
+    turn = recommand(PARALLELOGRAM, angle=np.linspace(0.0, math.tau, 73))
     path = write_upright(tmp_path, pad="")
     limited = path.read_text().replace('name="drive"', 'name="drive" range="-40 20"')
     path.write_text(limited)
@@ -228,7 +227,7 @@ def test_an_include_may_lie_in_the_folder_of_assets(tmp_path):
 
 
 def test_fewer_positions_than_a_fit_needs_are_refused(tmp_path):
-    few = replace(KNEE, motion=KNEE.motion.replace(angle=np.linspace(-0.5, 0.5, 5)))
+    few = recommand(KNEE, angle=np.linspace(-0.5, 0.5, 5))
     with raises(InputError, match="range of at least 6 positions"):
         measure_mimic(write(tmp_path), "s", few)
 

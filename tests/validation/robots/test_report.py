@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fourbar.linkage import Bar, FourBar, uniform
+from fourbar.linkage import uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.results_file import read_columns
@@ -35,9 +35,9 @@ from fourbar_validation.robots.report import (
 )
 from tests.support.robots import FINGER, measure_all
 from tests.support.rows import read_rows
-from tests.support.scenes import find_angle
+from tests.support.scenes import bare, find_angle
 
-SCENE = Scene(FourBar(0.3, Bar(0.1), Bar(0.3), Bar(0.1)), Motion(1.0, 1.0))
+SCENE = Scene(bare(0.3, 0.1, 0.3, 0.1), Motion(1.0, 1.0))
 """A parallelogram, in line at 0 and 180 deg."""
 
 

@@ -43,7 +43,7 @@ from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
 from tests.support.here import summary_of
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, recommand, relink
 from tests.support.texts import put
 
 SCENE = crank_rocker(motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
@@ -237,8 +237,8 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(cut, bar, joint, b
     """The work of the weights in a tree whose driven joint alone turns is that of its
     torque.
     """
-    still = SCENE.motion.replace(speed=0.0, acceleration=0.0)
-    scene = replace(SCENE, motion=still, drive_bar=bar)
+    still = recommand(SCENE, speed=0.0, acceleration=0.0)
+    scene = replace(still, drive_bar=bar)
     right = fourbar.solve(scene, "force")
     torque = sum(
         scene.linkage.bar(one).mass * 9.81 * (right[f"G{one}"] - right[joint])[:, 0]
@@ -411,9 +411,8 @@ def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     """The weight of the coupler is what the balances with and without it differ by."""
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
     scene = replace(scene, effects=(Gravity(),))
-    linkage = scene.linkage
-    massless = replace(linkage.coupler, mass=0.0, density=None, inertia=0.0)
-    light = replace(scene, linkage=replace(linkage, coupler=massless))
+    massless = replace(scene.linkage.coupler, mass=0.0, density=None, inertia=0.0)
+    light = relink(scene, coupler=massless)
 
     def leave_out_weight(numbers, at):
         inertial, weighing, neither = (
@@ -551,7 +550,7 @@ OTHER_SCENES = {
     ),
     "no inertial forces (statics), with friction": (
         replace(RUBBED, effects=(*RUBBED.effects, Gravity(9.81))),
-        replace(RUBBED, linkage=replace(SCENE.linkage, **LIGHT), loads=WEIGHTS),
+        replace(relink(RUBBED, **LIGHT), loads=WEIGHTS),
     ),
     "effects.springs.*.length left out": (
         with_springs(PULLING, PUSHING),

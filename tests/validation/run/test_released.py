@@ -20,6 +20,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report, make_question
+from tests.support.scenes import recommand, relink
 
 
 def falling(coupler=0.15):
@@ -109,8 +110,8 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
         )
         assert spread < MOST_SPREAD[coupler][engine], (engine, spread)
         assert passed.error < BEFORE_THE_LINE + spread, passed
-    before = scene.motion.replace(free=Free(first / 100.0, first))
-    rows = judge("falling", replace(scene, motion=before)).rows
+    before = recommand(scene, free=Free(first / 100.0, first))
+    rows = judge("falling", before).rows
     for engine in free.FORWARD:
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
 
@@ -139,8 +140,8 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
 def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     scene = falling()
     massless = Bar(getattr(scene.linkage, bar).length)
-    scene = replace(scene, linkage=replace(scene.linkage, **{bar: massless}))
-    answer = PinocchioReleased().release(scene, np.zeros(1))
+    without = relink(scene, **{bar: massless})
+    answer = PinocchioReleased().release(without, np.zeros(1))
     assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
 
 
@@ -185,8 +186,7 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
     """
     pushed = replace(falling(), effects=(), loads=(Load(4, moment=0.1),))
     for steps in (20, 200):  # 10 and 1 ms apart
-        motion = pushed.motion.replace(free=Free(0.2, steps))
-        rows = judge("pushed", replace(pushed, motion=motion)).rows
+        rows = judge("pushed", recommand(pushed, free=Free(0.2, steps))).rows
         assert not any(row.failed for row in rows)
         energy = row(rows, "mujoco-forward", "energy")
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy

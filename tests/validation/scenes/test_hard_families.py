@@ -49,7 +49,7 @@ from fourbar_validation.scenes.hard_families import (
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import crank_rocker, recommand
 from tests.validation.run.test_judge import rows_of
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
@@ -62,8 +62,7 @@ def take_last(family):
     *_, (_, scene) = family.scenes()
     sweep = scene.motion.theta_2
     if isinstance(sweep, Sweep):
-        motion = scene.motion.replace(angle=replace(sweep, steps=12))
-        scene = replace(scene, motion=motion)
+        scene = recommand(scene, angle=replace(sweep, steps=12))
     return scene
 
 
@@ -207,8 +206,7 @@ def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too
     assert row.verdict != FAILS and row.error < 1.0, row
 
     def write_other(scene):
-        motion = scene.motion.replace(branch=-scene.motion.branch)
-        return write_mjcf(replace(scene, motion=motion))
+        return write_mjcf(recommand(scene, branch=-scene.motion.branch))
 
     monkeypatch.setattr(shipped, "write_mjcf", write_other)
     other = compare_shipped(name, scene, fourbar.command(scene))

@@ -43,7 +43,7 @@ from tests.support.robots import (
     read_scene,
     report_of,
 )
-from tests.support.scenes import mirrored
+from tests.support.scenes import mirrored, recommand, relink
 
 ROBOTS = MODELS / "robots"
 ROCKER = fourbar.load(MODELS / "crank_rocker.toml")
@@ -183,12 +183,10 @@ def test_axes_sides_and_twins_have_the_same_errors():
     foot = read_robot(ROBOTS / "biped_foot.xml")
     made = measure(foot, loop="rod")
     gravity, *others = made.scene.effects
-    linkage = made.scene.linkage
+    moved = recommand(made.scene, angle=angles_of(made) + 0.3)
     turned = replace(
-        made.scene,
-        linkage=replace(linkage, ground_angle=linkage.ground_angle + 0.3),
+        relink(moved, ground_angle=moved.linkage.ground_angle + 0.3),
         effects=(replace(gravity, angle=gravity.angle + 0.3), *others),
-        motion=made.scene.motion.replace(angle=angles_of(made) + 0.3),
     )
     gripper = read_robot(ROBOTS / "gripper.xml")
     arm = driven_by_a_motor(BARE)
@@ -279,8 +277,7 @@ def test_what_the_scene_leaves_out_is_no_error_of_mujoco():
     assert changed != text
     loop = measure(changed, BARE)
     errors = errors_of(loop)
-    at = BARE.motion.replace(angle=angles_of(loop))
-    s = fourbar.solve(replace(BARE, motion=at))
+    s = fourbar.solve(recommand(BARE, angle=angles_of(loop)))
     taken = 0.01 * (s.alpha_3 - s.alpha_2) * (s.omega_3 - s.omega_2) / s.omega_2
     assert errors[RIGID].error == approx(np.abs(taken).max(), rel=1e-8)
     soft = [row.soft.torque - row.rigid.torque for row in loop.states.rows]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar.linkage import Bar, FourBar
 from fourbar_validation.engines.mujoco.robots.ancestry import list_followers
 from fourbar_validation.engines.mujoco.robots.mimic import read_joint_equality
 from fourbar_validation.robots.files import read_robot
@@ -21,9 +20,7 @@ FILE = """<mujoco><worldbody>
 </equality></mujoco>"""
 
 
-LOOP = fourbar.Scene(
-    FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.1), Bar(0.1, 0.1)), fourbar.Motion(1.0, 1.0)
-)
+LOOP = fourbar.Scene(fourbar.uniform(0.3, 0.1, 0.3, 0.1), fourbar.Motion(1.0, 1.0))
 
 
 def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path):
