@@ -19,6 +19,7 @@ from fourbar_lab.fuzz import (
     keep_counterexample,
     shrink_scene,
 )
+from tests.support.here import spoil_formulas
 from tests.support.scenes import crank_rocker
 
 SEED = 0
@@ -42,20 +43,16 @@ def test_a_scene_depends_on_its_number_alone():
     assert draw_fuzz_scene(3, 18) == draw_fuzz_scene(3, 18) != draw_fuzz_scene(3, 20)
 
 
-def small_error(true):
-    """One part in 1e9 of the moment of bar 3."""
+def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
+    """Of the moment of bar 3."""
+    solving = import_module("fourbar.evaluation.case")
+    true = solving.pin_forces
 
     def wrong(lengths, angles, drive_bar, w, *others):
-        return true(
-            lengths, angles, drive_bar, w._replace(M3=(1.0 + 1e-9) * w.M3), *others
-        )
+        wrenches = w._replace(M3=(1.0 + 1e-9) * w.M3)
+        return true(lengths, angles, drive_bar, wrenches, *others)
 
-    return wrong
-
-
-def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
-    solving = import_module("fourbar.evaluation.case")
-    monkeypatch.setattr(solving, "pin_forces", small_error(solving.pin_forces))
+    monkeypatch.setattr(solving, "pin_forces", wrong)
     scene = replace(
         crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
     )
@@ -79,13 +76,10 @@ def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
     scene = fourbar.Scene(
         fourbar.uniform(0.3, 0.25, 0.1, 0.22), fourbar.Motion([3.0], 1.0)
     )
-    true = fourbar.solve
 
-    def pretend(*arguments, **keywords):
-        solution = true(*arguments, **keywords)
+    def pretend(solution):
         solution.status_code[:] = 0
-        return solution
 
     assert examine.list_findings(scene) == []
-    monkeypatch.setattr("fourbar_validation.run.question.solve", pretend)
+    spoil_formulas(monkeypatch, pretend)
     assert any(" assembled: " in line for line in examine.list_findings(scene))

@@ -4,6 +4,7 @@ from collections import Counter
 
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.run_summary import Summary
+from fourbar_validation.run import question
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Progress
 
@@ -37,6 +38,17 @@ def judge_by(engine, scene):
     """The rows of one engine on a scene, by quantity."""
     rows = judge("scene", scene, [engine]).rows
     return {row.quantity: row for row in rows if row.engine == engine.name}
+
+
+def spoil_formulas(monkeypatch, spoil):
+    """Let the harness have solutions that are changed, in place or for others."""
+    true = question.solve
+
+    def solve(*arguments, **keywords):
+        solution = true(*arguments, **keywords)
+        return spoil(solution) or solution
+
+    monkeypatch.setattr(question, "solve", solve)
 
 
 def judge_here(monkeypatch):

@@ -360,22 +360,21 @@ def test_what_has_no_model_is_refused_by_name(name):
     assert "'wind'" in answered(name, replace(scene(), effects=(Wind(),))).refusal
 
 
-def scaled(right):
-    return lambda *arguments: right(*arguments) * (1.0 + 1e-9)
-
-
-def nothing_on_bar_3(right):
-    return lambda self, bar, couple: None if bar == 3 else right(self, bar, couple)
-
-
-def larger(right):
-    return lambda self, bar: right(self, bar) + 1e-13
-
-
 PLANTED = {
-    "rotation": (scaled, {"F43", "torque"}),
-    "couple": (nothing_on_bar_3, {"torque"}),
-    "angle": (larger, {"theta_3", "theta_4"}),
+    "rotation": (
+        lambda right: lambda *arguments: right(*arguments) * (1.0 + 1e-9),
+        {"F43", "torque"},
+    ),
+    "couple": (
+        lambda right: (
+            lambda self, bar, couple: None if bar == 3 else right(self, bar, couple)
+        ),
+        {"torque"},
+    ),
+    "angle": (
+        lambda right: lambda self, bar: right(self, bar) + 1e-13,
+        {"theta_3", "theta_4"},
+    ),
 }
 """By method: what is put in its place, and the quantities on which that must show."""
 

@@ -18,6 +18,7 @@ pytest.importorskip(
     "selenium",
     reason="pages are driven by selenium: pip install selenium",
 )
+pytestmark = pytest.mark.slow
 
 CONTRAST = 4.5
 """WCAG 2.1, level AA, for text."""
@@ -82,7 +83,6 @@ def require_contrast(driver):
     assert worst[0][0] >= CONTRAST, worst
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("dark", [False, True])
 def test_all_text_is_readable(browse, dark):
     """Also in the matrix of the benchmark, with its grounds of green, yellow and red.
@@ -97,7 +97,6 @@ def test_all_text_is_readable(browse, dark):
     require_contrast(browse(page[: page.index("</table>")], dark=dark))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, ALL_OPEN + 2])
 def test_a_number_leads_to_its_row(browse, count):
     driver = browse(report(copies(count))[1])
@@ -114,7 +113,6 @@ def test_a_number_leads_to_its_row(browse, count):
     assert row.find_elements("tag name", "td")[0].text == target.removeprefix("row-")
 
 
-@pytest.mark.slow
 def test_the_download_is_results_csv(browse):
     pages = copies(2)
     driver = browse(report(pages)[1])
@@ -125,7 +123,6 @@ def test_the_download_is_results_csv(browse):
     )
 
 
-@pytest.mark.slow
 def test_200_scenes_open_quickly_and_a_scene_when_opened(browse):
     driver = browse(report(copies(200))[1])
     times = driver.execute_script(

@@ -11,7 +11,6 @@ from pytest import approx, raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, InputError
-from fourbar.linkage import Bar, FourBar
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
 from fourbar_validation.cli import status
@@ -21,14 +20,21 @@ from fourbar_validation.robots.judge_mimic import (
     show_mimic,
 )
 from tests.support.rows import read_rows
-from tests.support.scenes import recommand
+from tests.support.scenes import bare, recommand
 from tests.validation.robots.test_sdf import URDF
 
 ROUND_OFF = 1e-12
 """rad, or without unit: angles and ratios of a few units in double precision."""
+
+
+def swing(first, last, steps):
+    """Turn at 1 rad/s from one angle to another, deg."""
+    return fourbar.Motion(np.radians(np.linspace(first, last, steps + 1)), 1.0)
+
+
 KNEE = Scene(
-    FourBar(0.3, Bar(0.04, 0.1), Bar(0.295, 0.12), Bar(0.045, 0.9), -0.5 * math.pi),
-    fourbar.Motion(np.radians(np.linspace(-40.0, 40.0, 161)), 5.0),
+    bare(0.3, 0.04, 0.295, 0.045, -0.5 * math.pi),
+    swing(-40.0, 40.0, 160),
     title="knee of a leg",
 )
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -43,14 +49,11 @@ FILE = """<mujoco><worldbody>
 
 
 GRIPPER = Scene(
-    FourBar(0.03, Bar(0.04, 0.02), Bar(0.034, 0.02), Bar(0.04, 0.02)),
-    fourbar.Motion(np.radians(np.linspace(60.0, 120.0, 61)), 1.0),
+    bare(0.03, 0.04, 0.034, 0.04),
+    swing(60.0, 120.0, 60),
     title="gripper",
 )
-PARALLELOGRAM = replace(
-    GRIPPER,
-    linkage=FourBar(0.03, Bar(0.04, 0.02), Bar(0.03, 0.02), Bar(0.04, 0.02)),
-)
+PARALLELOGRAM = replace(GRIPPER, linkage=bare(0.03, 0.04, 0.03, 0.04))
 UPRIGHT = """<mujoco><worldbody>
 <body name="crank"><joint name="drive" axis="0 0 {sense}"/>
 <geom type="capsule" fromto="0 0 0 0 0.04 0" size="0.004"/>{pad}</body>
@@ -102,8 +105,7 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
 
 
 def test_a_motion_through_a_change_point_is_refused(tmp_path):
-    angles = np.radians(np.linspace(-30.0, 30.0, 61))
-    through = recommand(PARALLELOGRAM, angle=angles)
+    through = replace(PARALLELOGRAM, motion=swing(-30.0, 30.0, 60))
     with raises(InputError, match=r"'0 deg'.*change point"):
         measure_mimic(write_upright(tmp_path), "rocker_j", through)
 
@@ -258,8 +260,8 @@ COUPLER = """<mujoco><worldbody><body name="crank"><joint name="j2" axis="0 0 1"
 
 
 COUPLER_SCENE = Scene(
-    FourBar(0.02, Bar(0.057, 0.1), Bar(0.022, 0.1), Bar(0.055, 0.1)),
-    fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0),
+    bare(0.02, 0.057, 0.022, 0.055),
+    swing(30.0, 90.0, 60),
 )
 
 
@@ -321,8 +323,7 @@ def test_mass_centres_tell_where_the_bars_of_a_urdf_are(
     dist = LINK.format("dist", far, ground, end, follow)
     path = tmp_path / "finger.urdf"
     path.write_text(f'<robot name="finger"><link name="palm"/>{prox}{dist}</robot>')
-    motion = fourbar.Motion(np.radians(np.linspace(60.0, 110.0, 51)), 1.0)
-    scene = Scene(FourBar(ground, *map(Bar, moving)), motion)
+    scene = Scene(bare(ground, *moving), swing(60.0, 110.0, 50))
     report = measure_mimic(path, "dist_j", scene)
     degrees = math.degrees(report.file.angle)
     assert degrees == approx(float(error), abs=2e-5, nan_ok=True)
@@ -343,8 +344,8 @@ def test_the_zero_of_a_follower_on_the_crank_is_read_at_the_rocker(
     follow = '<joint joint1="pad" joint2="drive" polycoef="0 -1 0 0 0"/></equality>'
     text = path.read_text().replace("</equality>", follow)
     path.write_text(text.replace('pos="0.03 0 0"', f'pos="{ground} 0 0"'))
-    bars = FourBar(ground, Bar(0.04, 0.02), Bar(ground, 0.02), Bar(0.04, 0.02))
-    report = measure_mimic(path, "pad", replace(GRIPPER, linkage=bars))
+    level = replace(GRIPPER, linkage=bare(ground, 0.04, ground, 0.04))
+    report = measure_mimic(path, "pad", level)
     assert report.file.angle <= ROUND_OFF
     assert "theta_2 is 90 deg + drive, from 60 to 120 deg" in shown(report)
 
@@ -384,7 +385,7 @@ PINS = (
     (-0.061, 0.2242),
     (-0.01272, 0.1595),
 )
-AT_36 = fourbar.Motion(np.radians(np.linspace(90.276, 162.276, 73)), 1.0)
+AT_36 = swing(90.276, 162.276, 72)
 BEHIND = {"theta_2": "126.2761691 deg"}
 
 
@@ -403,8 +404,8 @@ def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
     """The errors are those of pins B at the intersection of two circles."""
     path = tmp_path / "knuckle.xml"
     path.write_text(KNUCKLE)
-    drawn = fourbar.from_pins(*PINS)
-    scene = replace(drawn, **{"motion": drawn.motion.replace(angle=None), **change})
+    drawn = recommand(fourbar.from_pins(*PINS), angle=None)
+    scene = replace(drawn, **change)
     report = measure_mimic(path, "knuckle", scene, angles=angles)
     assert told in shown(report)
     if "another" not in told:

@@ -29,7 +29,7 @@ from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
-from tests.support.here import judge_by
+from tests.support.here import judge_by, spoil_formulas
 from tests.support.scenes import crank_rocker, find_angle
 
 
@@ -119,14 +119,11 @@ def test_what_fails_with_the_loads_is_not_told_again_of_the_inertia(spoil, faili
 
 def test_positions_are_singular_only_where_bars_3_and_4_are_in_line(monkeypatch):
     """Their numbers are there, and no engine is compared with them."""
-    true = fourbar.solve
 
-    def withhold(*arguments, **stated):
-        solution = true(*arguments, **stated)
+    def withhold(solution):
         solution.status_code[:2] = SINGULAR
-        return solution
 
-    monkeypatch.setattr("fourbar_validation.run.question.solve", withhold)
+    spoil_formulas(monkeypatch, withhold)
     rows = judge("", crank_rocker(), [FREE_BODY]).rows
     failed = [(row.quantity, row.error) for row in rows if row.failed]
     assert ("status", 2.0) in failed

@@ -116,24 +116,21 @@ def test_of_two_copies_of_a_part_one_that_is_whole_is_enough(parts, run, tmp_pat
 def test_two_copies_of_a_part_that_differ_are_refused(
     parts, run, tmp_path, monkeypatch, refusal
 ):
-    monkeypatch.setattr(Store, "put", worsen(Store.put))
-    copy = run("copy", "--part", "2/3")
-    said = refusal(*parts, copy)
-    assert f"DIR = '{copy}': holds another result than {parts[1]}: " in said
-    assert " of free-body in random-0-000000002" in said
-    out = ["-o", str(tmp_path / "all")]
-    assert status(["collect", parts[0], copy, parts[2], *out]) == HOLDS
-
-
-def worsen(put):
-    """A store that writes another error into one row of its results."""
+    """In another error in one row."""
+    put = Store.put
 
     def put_worse(store, task, results):
         row = next(row for row in results[0]["rows"] if row[1] == "free-body")
         row[4] = 0.5
         put(store, task, results)
 
-    return put_worse
+    monkeypatch.setattr(Store, "put", put_worse)
+    copy = run("copy", "--part", "2/3")
+    said = refusal(*parts, copy)
+    assert f"DIR = '{copy}': holds another result than {parts[1]}: " in said
+    assert " of free-body in random-0-000000002" in said
+    out = ["-o", str(tmp_path / "all")]
+    assert status(["collect", parts[0], copy, parts[2], *out]) == HOLDS
 
 
 def test_a_resumed_run_says_which_answers_it_keeps(run, capsys):

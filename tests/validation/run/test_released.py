@@ -75,14 +75,18 @@ def find_spread_by_energy(scene, solution, instant, engine):
     return spread
 
 
+def ask_briefly():
+    released = recommand(falling(), free=Free(0.1, 5))
+    return make_question("falling", released, ENGINES)
+
+
 def row(rows, engine, quantity):
     (found,) = (row for row in rows if (row.engine, row.quantity) == (engine, quantity))
     return found
 
 
 def test_engines_that_agree_on_a_released_linkage_against_fourbar_name_it():
-    motion = Motion(1.0, 0.0, free=Free(0.1, 5))
-    question = make_question("falling", replace(falling(), motion=motion), ENGINES)
+    question = ask_briefly()
     question.solution = replace(question.solution, F14=-question.solution.F14)
     failed = {row.quantity for row in free._compare_forces(question) if row.failed}
     assert failed == question.against.keys() == {"F14"}
@@ -213,8 +217,7 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
 @pytest.mark.parametrize("declared, verdict", [(1e-3, AGREES), (1e-5, FAILS)])
 def test_a_guest_may_err_in_a_released_motion_by_what_it_declares(declared, verdict):
     """One of adaptive steps errs alike whatever step it is given."""
-    motion = Motion(1.0, 0.0, free=Free(0.1, 5))
-    question = make_question("falling", replace(falling(), motion=motion), ENGINES)
+    question = ask_briefly()
     moved = question.solution.theta_2 + 3e-5, question.solution.omega_2
     answer = ReleasedAnswer("adaptive", "", *moved, np.zeros(6), np.ones(6))
     tolerance = replace(EQUIVALENCE, factor=declared, reason="as it says")

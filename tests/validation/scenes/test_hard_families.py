@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import fourbar
-import fourbar_validation.run.question
 from fourbar import Motion, Sweep, uniform
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene
@@ -48,7 +47,7 @@ from fourbar_validation.scenes.hard_families import (
 )
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED
-from tests.support.here import judge_by
+from tests.support.here import judge_by, spoil_formulas
 from tests.support.scenes import crank_rocker, recommand
 from tests.validation.run.test_judge import rows_of
 
@@ -124,18 +123,14 @@ def test_near_a_toggle_all_but_the_sine_has_its_digits_though_it_has_few_itself(
     """
     near = place_before_toggle(*families.REGULAR, 1e-9)
     (balls,) = [engine for engine in HARD_ENGINES if engine.answers_nearby]
-    true = fourbar_validation.run.question.solve
-
     assert {row.verdict for row in judge_by(balls, near).values()} == {AGREES}
     torque = judge_by(replace(balls, answers_nearby=False), near)["torque"]
     assert torque.verdict == DEGRADED and torque.allowed > 1e-6
 
-    def spoiled(*arguments, **keywords):
-        solution = true(*arguments, **keywords)
+    def miss(solution):
         solution.torque[-1] *= 1.0 + 1e-6
-        return solution
 
-    monkeypatch.setattr(fourbar_validation.run.question, "solve", spoiled)
+    spoil_formulas(monkeypatch, miss)
     assert judge_by(balls, near)["torque"].verdict == FAILS
 
 

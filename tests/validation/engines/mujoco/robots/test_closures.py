@@ -29,6 +29,9 @@ from tests.support.robots import (
 )
 from tests.support.rows import read_rows
 
+PLANAR = Planar()
+TEXT = PLANAR.text()
+
 
 def closure_of(text, **options):
     return report_of(text, **options).closures[0]
@@ -199,11 +202,11 @@ YOKE = """
 def test_a_weld_of_three_joints_leaves_no_freedom():
     reason = closure_of(YOKE).reason
     assert reason == "a weld that leaves no freedom: 2 joints in a plane cannot move"
-    text = Planar().text().replace("<connect", "<weld")
+    text = TEXT.replace("<connect", "<weld")
     assert "a weld that leaves no freedom: 3 hinges" in closure_of(text).reason
     pin = text.replace("<weld", '<weld torquescale="0"')
     # the anchor of a weld is in the frame of the second body
-    pins = Planar().pins
+    pins = PLANAR.pins
     x, y = np.subtract(pins["B"], pins["A"])
     closed_at = (pins["O4"][0] + x, pins["O4"][1] + y)
     assert loop_of(pin).lengths[2:] == approx(
@@ -238,39 +241,38 @@ def test_a_hinge_in_place_of_a_ball_among_parallel_axes_is_what_to_type(limited)
 
     What is advised makes the linkage of the pins.
     """
-    planar = Planar()
     joint = 'name="A" axis="0 0 1" '
-    place = planar.text().index(joint)
-    before = planar.text()[:place]
+    place = TEXT.index(joint)
+    before = TEXT[:place]
     tilted = 'quat="0.6 0.8 0 0"><joint '
     opened = before.rindex("><joint ")
     start = before[:opened] + " " + tilted + 'name="A" '
     # the end of the coupler stays where it was: turned back by the same angle
-    x, y = np.subtract(planar.pins["B"], planar.pins["A"]).tolist()
+    x, y = np.subtract(PLANAR.pins["B"], PLANAR.pins["A"]).tolist()
     _, there, z = (rotation((0.6, -0.8, 0.0, 0.0)) @ (x, y, 0.0)).tolist()
-    end = planar.text()[place + len(joint) :].replace(
+    end = TEXT[place + len(joint) :].replace(
         f'anchor="{x!r} {y!r} 0"', f'anchor="{x!r} {there!r} {z!r}"'
     )
     reason = closure_of(f'{start}type="ball" {limited}{end}').reason
     typed = reason.partition("(")[2].partition(" in the file)")[0]
     assert ("limited" in typed) == bool(limited)
     loop = loop_of(f"{start}{typed}{end}")
-    assert loop.lengths == approx(planar.lengths(), rel=1e-6)
+    assert loop.lengths == approx(PLANAR.lengths(), rel=1e-6)
     assert loop.misaligned < 1e-6
 
 
 def test_a_ball_joint_and_a_floating_body_are_named():
-    ball = Planar().text().replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
+    ball = TEXT.replace('name="A" axis="0 0 1"', 'name="A" type="ball"')
     assert "A is a ball joint, but the axes" in closure_of(ball).reason
     spatial = ball.replace('name="O4" axis="0 0 1"', 'name="O4" axis="1 0 0"')
     served = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
     said = f"is a ball joint: the loop is spatial ({served})"
     assert closure_of(spatial).reason == f"A {said}"
     crossing = 'name="A" axis="0 0 1"/><joint name="across" axis="1 0 0"'
-    hinges = Planar().text().replace('name="A" axis="0 0 1"', crossing)
+    hinges = TEXT.replace('name="A" axis="0 0 1"', crossing)
     assert "unless hinges in one place are a ball" in closure_of(hinges).reason
     lengths = loop_of(hinges, held=("across",)).lengths
-    assert lengths == approx(Planar().lengths())
+    assert lengths == approx(PLANAR.lengths())
     two = ball.replace('name="O4" axis="0 0 1"', 'name="O4" type="ball"')
     assert closure_of(two).reason.endswith(said)
     loose = (
@@ -328,7 +330,7 @@ def test_a_body_that_floats_between_two_pins_is_told_its_hinge():
 
 def test_two_connects_along_one_axis_are_one_pin():
     second = '<connect body1="coupler" body2="output" anchor="0.22 0.09 0.02"/>'
-    text = Planar().text().replace("</equality>", f"{second}</equality>")
+    text = TEXT.replace("</equality>", f"{second}</equality>")
     report = report_of(text)
     one, other = report.closures
     assert (one.name, other.name) == ("coupler-output-1", "coupler-output-2")
@@ -358,7 +360,7 @@ def test_two_connects_along_one_axis_are_one_pin():
     ],
 )
 def test_an_equality_of_joints_or_of_a_fixed_tendon_is_a_mimic(tendon, mimic, words):
-    text = Planar().text().replace("</equality>", f"{mimic}</equality>{tendon}")
+    text = TEXT.replace("</equality>", f"{mimic}</equality>{tendon}")
     one, other = report_of(text).closures
     named = "T: tendon, no four-bar" if tendon else "O4-O2: joint, no four-bar"
     assert other.text.startswith(named)
@@ -427,12 +429,11 @@ def test_an_equality_of_a_spatial_tendon_acts_if_its_length_follows_the_bars(
 
 
 def test_another_hinge_of_the_ground_can_be_the_driven_one():
-    planar = Planar()
-    loop = loop_of(planar.text(), drive="O4")
-    d, a, b, c = planar.lengths()
+    loop = loop_of(TEXT, drive="O4")
+    d, a, b, c = PLANAR.lengths()
     assert loop.lengths == approx((d, c, b, a))
     assert loop.cut == "A"
-    other = loop_of(planar.text(), drive="O2").from_other_end
+    other = loop_of(TEXT, drive="O2").from_other_end
     if other.axes[2] @ loop.axes[2] < 0.0:
         other = other.seen_from_behind()
     for name in ("cut", "cut_bars", "bodies", "hinges", "senses"):
@@ -442,9 +443,9 @@ def test_another_hinge_of_the_ground_can_be_the_driven_one():
     assert other.lengths == approx(loop.lengths)
     np.testing.assert_allclose(np.linalg.det(other.seen_from_behind().axes), 1.0)
     with raises(InputError, match="drives no four-bar"):
-        loop_of(planar.text(), drive="A")
+        loop_of(TEXT, drive="A")
     with raises(InputError, match="no such joint; the file has: joint 0, O2"):
-        loop_of(planar.text(), drive="wheel")
+        loop_of(TEXT, drive="wheel")
 
 
 def test_without_a_motor_the_first_hinge_of_the_ground_is_driven():
@@ -480,7 +481,7 @@ def test_what_drives_a_loop_by_no_hinge_is_named(drive):
 
 
 def test_a_loop_is_chosen_by_its_name():
-    posed, loop = pose_loop(Planar().text())
+    posed, loop = pose_loop(TEXT)
     (chosen,) = find_loops(posed, "coupler-output")
     assert chosen.name == loop.name == "coupler-output"
     with raises(InputError, match="the file has: coupler-output"):
