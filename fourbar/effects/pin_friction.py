@@ -34,8 +34,10 @@ NEWTON_STEPS = 60
 """Steps after which an iteration that goes on does not converge; most take five."""
 SETTLED = 32.0 * 2.0**-52
 """Change of x, relative, that is the rounding of its evaluation."""
-SOLVED = 1e-9
-"""Gap of a solution, relative; the iteration converges to rounding or not at all."""
+SOLVED = 1e-12
+"""Gap of a solution, relative. Where solutions meet it is the square of SAME_SOLUTION:
+a larger one would find two where there is none.
+"""
 SAME_SOLUTION = 1e-6
 """Two solutions found by the search are the same if they differ by less, relative."""
 FARTHEST = 1e12

@@ -46,6 +46,8 @@ CONES = read_rows("""
 1 0 | 0 0.6 | one | 1.25 | 0.64
 0 0 | 0.5 0.3 | one | 0 | 1
 3 4 | 0 0 | one | 5 | 1
+# beyond the fold at C_y = 1
+1 0 | -2 1.000000001 | none | nan | nan
 # beside jamming, 1 - 2^-20
 1 0 | 0.9999990463256836 0 | one | 1048576 | 9.5367431640625e-07
 """)

@@ -276,12 +276,13 @@ def _compare_status(question: Question, reference: Solution) -> Row:
         differ |= (code == OVERFLOW) & moves & in_line
         apart = reference.drive_condition > TOO_NEAR_A_TOGGLE
         differ |= np.isin(code, (NO_TORQUE, NO_LEVER)) & apart
-    close = mark_touching(linkage, formulas.theta_2)
-    close |= reference.condition < TOO_NEAR_A_TOGGLE
+    touching = mark_touching(linkage, formulas.theta_2)
+    close = touching | (reference.condition < TOO_NEAR_A_TOGGLE)
     close |= formulas.condition < TOO_NEAR_A_TOGGLE
     singular = np.isin(code, (SINGULAR, CHANGE_POINT))
     differ |= singular & ~close & ~large
-    near = np.flatnonzero(close)
+    # within the rounding of the lengths a limit counts as met
+    near = np.flatnonzero(close & ~(singular & touching))
     of_theta_2 = command.remainder is None and command.commanded == "theta_2"
     if of_theta_2 and len(near) and not find_missing("flint"):
         # exact arithmetic has to decide there

@@ -16,7 +16,11 @@ from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.limits import MOST_UNEVEN, NEAREST_CENTRE
+from fourbar_validation.engines.limits import (
+    MOST_UNEVEN,
+    NEAREST_CENTRE,
+    find_uneven,
+)
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.runner import Lead
@@ -199,6 +203,13 @@ def test_an_alarm_between_bars_that_are_uneven_is_a_declared_limit(monkeypatch):
     assert refused.quantity == "torque_inertia"
     assert refused.reason.startswith("acceleration_gap = ")
     assert refused.reason.endswith(f"{MOST_UNEVEN.reason}, here by 9.1e+06")
+
+
+def test_a_crank_that_does_not_keep_its_speed_is_an_alarm_of_uneven_bars_too():
+    weak = MujocoSimulated(replace(RECIPE, flywheel=10.0))
+    scene = fourbar.load(MODELS / "thesis.toml")
+    answer = weak.answer(scene, fourbar.command(scene))
+    assert find_uneven(scene) and answer.alarms[0].startswith("speed_error")
 
 
 def test_a_load_that_the_compiler_moves_to_the_pin_is_a_declared_limit():

@@ -33,7 +33,7 @@ from fourbar_validation.engines.mujoco.closed_loop import (
     A,
     ClosedLoop,
 )
-from fourbar_validation.engines.tree import put_back, solve_multipliers
+from fourbar_validation.engines.tree import put_back, solve_closed, solve_multipliers
 
 RESIDUALS = ("acceleration_gap", "power_gap", "force_gap")
 """Residuals of motion and forces that `ResidualMonitor` measures."""
@@ -144,12 +144,13 @@ class ResidualMonitor:
     def look(
         self,
         loop: ClosedLoop,
+        read: ClosedLoop,
         torque: float,
         loop_force: Array,
     ) -> dict[str, float]:
         """Take in a forwarded state, and return the error to expect of each quantity.
 
-        The drive's torque and F43 are as read.
+        The drive's torque and F43 are as read, of the loop `read`.
         """
         data = loop.data
         q, v, a = (x.copy() for x in (data.qpos, data.qvel, data.qacc))
@@ -169,6 +170,7 @@ class ResidualMonitor:
         self._keep("force_gap", unbalanced, acting)
         try:
             closed = self._close(q, v, a, seen)
+            rates = solve_closed(seen.jacobian, 1.0)
         except np.linalg.LinAlgError:
             # exactly at a limit position nothing closes the loop
             return dict.fromkeys(seen.answer, math.inf)
@@ -186,9 +188,10 @@ class ResidualMonitor:
                 size = max(size, float(np.linalg.norm(seen.needed)))
             expected[name] += min(error, _EXCUSED * size)
         # the drive does what the flywheel's torque leaves; their powers are compared
-        flywheel = abs(float(loop.model.dof_armature[O2] * a[O2] * v[O2]))
+        flywheel = read.model.dof_armature[O2] * a[O2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            expected[self.drive] += _ROUNDINGS * EPS * flywheel / abs(seen.drive @ v)
+            rounding = abs(float(flywheel / (seen.drive @ rates)))
+        expected[self.drive] += _ROUNDINGS * EPS * rounding
         return expected
 
     def _keep(

@@ -99,7 +99,7 @@ def compare_shipped(
         mujoco.mj_resetData(loop.model, d)
     else:  # a motor: on from the keyframe
         due += scene.motion.alpha_2 * driven
-    beyond = _find_not_driven(scene, float(d.qpos[O2]), fastest, driven)
+    beyond = _find_not_driven(scene, float(d.qpos[O2]), driven)
     if beyond is None:
         mujoco.mj_step(loop.model, d, SERVO_STEPS)
         missed = abs(float(d.qvel[O2]) - due)
@@ -111,7 +111,7 @@ def compare_shipped(
         allowed = SPEED_ERROR * max(abs(omega), abs(due))
         departures[reason] = math.inf if lost else missed / allowed
         if not departures[reason] <= 1.0:
-            beyond = find_exceeded(scene, abs(omega)) or find_uneven(scene)
+            beyond = _find_excuse(scene, loop, fastest, lost=lost)
             if beyond:
                 del departures[reason]
     reason, error = max(
@@ -151,20 +151,28 @@ def _find_commanded(
 def _find_not_driven(
     scene: Scene,
     theta_2: float,
-    fastest: float,
     seconds: float,
 ) -> str | None:
-    """Name the declared limit of the simulation that the first steps meet, if any.
-
-    `fastest`: greatest speed of a bar at the start, rad/s.
-    """
+    """Name the declared limit of the simulation that the first steps meet, if any."""
     omega_2 = scene.motion.omega_2 or 0.0
     if abs(omega_2) > FASTEST.boundary:
         return FASTEST.reason
     ahead = np.array([theta_2, theta_2 + omega_2 * seconds])
     least = compute_least_sine(scene.linkage, ahead, np.array([True, True]))
-    if least < NEAREST_TOGGLE.boundary:
-        return NEAREST_TOGGLE.reason
-    if fastest * SERVO_STEPS / (2.0 * seconds) > QUICKEST_START.boundary:
+    return None if least >= NEAREST_TOGGLE.boundary else NEAREST_TOGGLE.reason
+
+
+def _find_excuse(
+    scene: Scene, loop: ClosedLoop, fastest: float, *, lost: bool
+) -> str | None:
+    """Name the declared limit by which a drive may miss its speed, if any.
+
+    `fastest`: greatest speed of a bar at the start, rad/s. `lost`: the data were reset.
+    """
+    quickest = QUICKEST_START.boundary * 2.0 * loop.model.opt.timestep
+    if scene.motion.alpha_2 == 0.0 and fastest > quickest:
         return QUICKEST_START.reason
-    return None
+    exceeded = find_exceeded(scene, abs(scene.motion.omega_2 or 0.0))
+    if exceeded is None and (lost or loop.bad()):
+        return find_uneven(scene)
+    return exceeded
