@@ -915,6 +915,13 @@ def test_a_mistake_is_recognised_in_numbers_that_are_right_only_to_the_stated_to
     assert first.text == "loads doubled" and first.complete
 
 
+def test_a_factor_with_a_plain_name_is_named_in_a_table_of_one_row(judged):
+    for times, name in ((2.0, "loads doubled"), (-1.0, "loads reversed")):
+        numbers = loads_times(times, times)(OURS)
+        row = {key: values[:1] for key, values in numbers.items()}
+        assert judged(OURS, row, ["torque"]).explanations[0].text == name
+
+
 def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
     numbers = bars(scaled(inertia=0.98), "output")(OURS)
     *_, third, second, _ = sorted(abs(numbers["torque"] / right(OURS)["torque"] - 1.0))

@@ -318,3 +318,20 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
 def test_a_table_without_an_angle_names_the_commanded_one(read):
     with raises(InputError, match=r"needs a column theta_4 \(say theta_4 \[deg"):
         read("torque\n1.0\n", "theta_4")
+
+
+@pytest.mark.parametrize("decimals, refused", [(1, True), (15, False)])
+def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, refused, read):
+    law = fourbar.Sine(1.0, 0.5, 2.0 * math.pi, 1.0, 0.1 * math.pi)  # its peak: 0.2 s
+    scene = crank_rocker(motion=Motion(law=law))
+    times = np.array([0.05, 0.12, 0.22, 0.31, 0.47])
+    theta, omega, alpha = law.at(times)
+    at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
+    columns = np.round(times, decimals), theta, fourbar.solve(scene, at=at).torque
+    rows = [",".join(map(repr, row)) for row in np.transpose(columns).tolist()]
+    table = read("\n".join(["time,theta_2,torque", *rows, ""]))
+    if refused:
+        with raises(InputError, match=r"line 4, time = 0\.2: the law is at"):
+            Judgement(scene, table)
+    else:
+        assert Judgement(scene, table).status == HOLDS

@@ -225,8 +225,6 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     if not columns:
         return
     right = _compute_residual(columns, Mistake("", judge.right.__getitem__)).ravel()
-    if np.count_nonzero(right) < ENOUGH_NUMBERS:
-        return
     scene = state_all(judge.scene)
     at = drop_remainder(judge.at)
     jumps = any(isinstance(one, Friction | PinFriction) for one in scene.effects)
@@ -234,7 +232,10 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
         fitted = _fit(columns, family, right, jumps)
         for numbers in () if fitted is None else (np.round(fitted), fitted):
             if np.abs(numbers).max() > LEAST_NUMBER:
-                yield family.make(*numbers.tolist())._replace(times=CARRIED)
+                mistake = family.make(*numbers.tolist())
+                if mistake.text.endswith(FITTED) or not family.of_ours:
+                    mistake = mistake._replace(times=CARRIED)
+                yield mistake
 
 
 def _fit(

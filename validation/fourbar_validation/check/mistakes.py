@@ -107,7 +107,9 @@ def list_rates_of_rows(
         field: columns[name].theirs for field, name in fields.items() if name in columns
     }
     if "speed" in stated and any(one.key not in fields.values() for one in differing):
-        text = f"each row has its own speed: leave {omega} and {alpha} out of the scene"
+        text = "each row has its own speed"
+        if judge.scene.motion.law is None:
+            text += f": leave {omega} and {alpha} out of the scene"
         yield solve_other(
             text, judge.scene, drop_remainder(judge.at)._replace(**stated)
         )
@@ -230,8 +232,8 @@ def explain(
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
 
-    The most complete come first; what has a plain name, and explains all, comes alone.
-    A mistake of the calculation breaks no quantity that
+    The most complete come first. Fitted numbers are left out if a mistake of the
+    calculation with a plain name explains all. Such a mistake breaks no quantity that
     agreed as it was; those of columns count together.
     """
     least = ENOUGH_EXPLAINED * len(differing)

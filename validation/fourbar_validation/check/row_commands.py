@@ -246,12 +246,21 @@ def _follow_law(
     half = np.where(fits_stated, filled, half)
     half = np.where(fits_stated & np.isin(printed, (first, last)), 0.0, half)
     ends = [np.clip(printed + side, first, last) for side in (-half, half)]
-    nearest = stated
-    for _ in range(_NEWTON):
-        step = divide(measure(nearest), law.at(nearest)[1])
-        nearest = np.clip(nearest + step, *ends)
-    time = np.where(fits_stated, stated, nearest)
+
+    def find(time: Array) -> Array:
+        """Return the time next to one at which the law has the angle of the row."""
+        for _ in range(_NEWTON):
+            step = divide(measure(time), law.at(time)[1])
+            time = np.clip(time + step, *ends)
+        return time
+
+    time = np.where(fits_stated, stated, find(stated))
     off = ~(np.abs(measure(time)) <= rounding + _ONE_PLACE)
+    before, after = map(find, ends)
+    # the law turns back between two times that fit
+    several = fits(before) & fits(after)
+    several &= law.at(before)[1] * law.at(after)[1] < 0.0
+    off |= several & ~fits_stated
     if off.any():
         names = scene.motion.names[1:]
         if all(name in table.columns for name in names):

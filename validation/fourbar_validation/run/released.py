@@ -1,8 +1,8 @@
 """Free motions of every engine against the formulas.
 
-An engine's error is predicted
-by itself: it runs twice, with its step and with twice its step, and the difference is
-what the coarser motion errs by. The finer one must not err by more than ten times that.
+An engine's error is predicted by itself: it runs twice, with its step and with twice
+its step, and the difference is what the coarser motion errs by. The finer one must not
+err by more than ten times that.
 """
 
 import math
