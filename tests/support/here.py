@@ -51,6 +51,11 @@ def spoil_formulas(monkeypatch, spoil):
     monkeypatch.setattr(question, "solve", solve)
 
 
+def list_failed(scene, engines):
+    """The rows that fail where a scene is judged by engines."""
+    return [row for row in judge("scene", scene, engines).rows if row.failed]
+
+
 def judge_here(monkeypatch):
     """Do the items of the workers in this process, one after another."""
 

@@ -53,7 +53,7 @@ def crank_rocker(**changes):
 
 RESTING = crank_rocker(
     motion=Motion(math.radians(40.0), 0.0),
-    effects=(Gravity(), Friction((("O2", 0.2),))),
+    effects=(Gravity(), Friction.at(O2=0.2)),
 )
 """Held by the drive and by dry friction, whose couple at O2 is up to 0.2 N m."""
 

@@ -611,7 +611,7 @@ OTHERS = {
         solve(relink(STROKE, ground_angle=0.0)),
     ),
     "effects.torsion.O4 left out": (
-        replace(OURS, effects=(Torsion((("O4", 2.0, 1.0, 0.5),)),)),
+        replace(OURS, effects=(Torsion.at(O4=(2.0, 1.0, 0.5)),)),
         solve(replace(OURS, effects=())),
     ),
 }
@@ -682,7 +682,7 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, c
 
     Half a printed digit over a scale of 0 once excused any number.
     """
-    scene = Scene(bare(0.3, 0.1, 0.25, 0.22), fourbar.Motion(1.0, 2.0))
+    scene = Scene(bare(0.3, 0.1, 0.25, 0.22), Motion(1.0, 2.0))
     assert check(scene, f"theta_2,torque\n1.0,{torque}\n")[0] == code
 
 
@@ -708,7 +708,7 @@ def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     motion, words, check
 ):
     """A released scene is not judged at the speed of its start."""
-    scene = replace(OURS, motion=fourbar.Motion(**motion))
+    scene = replace(OURS, motion=Motion(**motion))
     code, _, error = check(scene, "theta_2,torque\n0.3,1.0\n")
     assert code == BAD_INPUT and words in error and "scene.toml: motion" in error
 
@@ -804,7 +804,7 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(read, check):
 def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     delimiter, degrees, check
 ):
-    text = fourbar.solve(THESIS, "error").to_csv(degrees=degrees)
+    text = solve(THESIS, "error").to_csv(degrees=degrees)
     # without the derived quantities, which stand before the time
     cells = [line.split(",") for line in text.splitlines()[:40]]
     rows = [row[:14] + row[-22:-13] + row[-1:] for row in cells]
@@ -933,9 +933,9 @@ def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
     scene = Scene(
         fourbar.uniform(0.3, 0.1, 0.3, 0.1),
-        fourbar.Motion(fourbar.Sweep(0.5, 4.0, 21), 2.0),
+        Motion(Sweep(0.5, 4.0, 21), 2.0),
     )
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     assert {*solution.branch.tolist()} == {1, -1}
     judgement = Judgement(scene, read(solution.to_csv()))
     assert judgement.status == HOLDS and judgement.compared > 100
@@ -1200,7 +1200,7 @@ def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
 
     A number that is off by 1 % has no such line.
     """
-    numbers = fourbar.solve(THESIS)
+    numbers = solve(THESIS)
     torque = np.array([float(f"{x:.{digits - 1}e}") for x in numbers.torque])
 
     def print_digits():

@@ -11,7 +11,7 @@ import pytest
 from pytest import raises
 
 import fourbar
-from fourbar import Motion, Sweep
+from fourbar import Motion, Sweep, solve
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import Judgement
@@ -78,10 +78,10 @@ def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     scene = commanding(bar, *ends)
     angles = np.radians(np.linspace(*ends, 9 if same else 6))
     at = recommand(scene, angle=angles)
-    solution = fourbar.solve(at)
+    solution = solve(at)
     assert set(solution.status) == {"ok"}
     name = f"theta_{bar}"
-    faster = fourbar.solve(recommand(at, speed=2.0 * 30.0 / math.pi))
+    faster = solve(recommand(at, speed=2.0 * 30.0 / math.pi))
     torques = solution.torque, -solution.torque, faster.torque
     good, bad, slip = (judged(scene, name, angles, torque) for torque in torques)
     assert good.status == HOLDS and good.compared == len(angles)
@@ -94,7 +94,7 @@ def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
 def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
     """The other bars' accelerations follow that of the output alone."""
     scene = commanding(4, 115.0, 155.0)
-    right = fourbar.solve(scene)
+    right = solve(scene)
     columns = right.theta_4, -0.5 * right.omega_2, -0.5 * right.omega_3
     table = read(write("theta_4,alpha_2,alpha_3", *columns), "theta_4")
     (first, *_) = Judgement(scene, table).explanations
@@ -104,7 +104,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
 def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
     """The angles of the output are printed to a hundredth of a degree, twice a turn."""
     scene = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 24), 10.0))
-    right = fourbar.solve(scene)
+    right = solve(scene)
     off = right.torque * (1.0 + 1e-9 * (np.arange(25) == 7))
     for torque, lines in ((right.torque, []), (off, [9])):
         found = judged(scene, "theta_4", right.theta_4, torque, "{:.2f}")
@@ -115,7 +115,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
     """A sweep of steps of 20/3 deg, printed to two decimals; 47 deg is none of it."""
     motion = Motion(Sweep(0.0, math.radians(120.0), 18), 10.0)
     scene = crank_rocker(motion=motion)
-    right = fourbar.solve(scene)
+    right = solve(scene)
     degrees, torque = np.degrees(right.theta_2)[1::4], right.torque[1::4]
     for form, differ in ((".2f", 0), (".0f", 0), (".1f", 5)):
         shift = 0.1 if form == ".1f" else 0.0
@@ -132,7 +132,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
 def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judged):
     """It is passed twice a turn, and once within the range of the scene."""
     scene = commanding(2, *ends)
-    limits = np.sort(fourbar.solve(scene, "position").theta_4[[0, -1]])
+    limits = np.sort(solve(scene, "position").theta_4[[0, -1]])
     theta_4 = np.radians(np.arange(*np.ceil(np.degrees(limits)), 5.0))
     assert len(theta_4) > 3
     table = read(tabulate("theta_4", theta_4, theta_4, "{:.0f}"))
@@ -141,14 +141,14 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judge
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
     turned = math.radians(ends[0]) - 0.1, math.radians(ends[1]) + 0.1
     assert ((angles > turned[0]) & (angles < turned[1])).all()
-    torque = fourbar.solve(scene, at=at_angles(angles)).torque
+    torque = solve(scene, at=at_angles(angles)).torque
     assert judged(scene, "theta_4", theta_4, torque, "{:.0f}").status == HOLDS
 
 
 def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
     """Six decimals are a rounded number; what half a unit changes is allowed."""
     scene = commanding(2, 60.0, 220.0)
-    right = fourbar.solve(scene, at=at_angles([1.2, 1.7, 2.4]))
+    right = solve(scene, at=at_angles([1.2, 1.7, 2.4]))
     for off, code in ((0.0, HOLDS), (1e-5, FAILED)):
         torque = right.torque * (1.0 + off)
         found = judged(scene, "theta_4", right.theta_4, torque, "{:.6f}")
@@ -239,7 +239,7 @@ def follow_rise(time):
     omega = h / 0.8 * 30.0 * u * u * (1.0 - 2.0 * u + u * u)
     alpha = h / 0.64 * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u)
     at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
-    return theta, omega, alpha, fourbar.solve(SERVO, at=at).torque
+    return theta, omega, alpha, solve(SERVO, at=at).torque
 
 
 @pytest.mark.parametrize("names, refused", LOGGED)
@@ -279,7 +279,7 @@ def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
     time = (theta - math.radians(start)) / speed
-    text = write("time,torque", time, fourbar.solve(scene).torque)
+    text = write("time,torque", time, solve(scene).torque)
     judgement = Judgement(scene, read(text))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
@@ -308,7 +308,7 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     judgement = Judgement(scene, table)
     assert [finding.line for finding in judgement.differing] == [3]
     assert judgement.compared == 3 and judgement.table.found_by == "theta_2"
-    own = fourbar.solve(scene, "position")
+    own = solve(scene, "position")
     text = tabulate("theta_2", own.theta_2, own.stroke).replace("torque", "stroke")
     assert Judgement(scene, read(text)).status == HOLDS
     with raises(InputError, match="needs a column stroke"):

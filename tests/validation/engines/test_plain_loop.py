@@ -16,7 +16,7 @@ from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 
 SCENES = (
     *(crank_rocker(drive_bar=bar) for bar in (2, 3)),
-    crank_rocker(effects=(fourbar.Viscous((("A", 0.1),)),)),
+    crank_rocker(effects=(fourbar.Viscous.at(A=0.1),)),
     low_parallelogram(),
     thesis(np.radians([100.0, 135.0])),
     fourbar.load(MODELS / "crank_rocker.toml"),

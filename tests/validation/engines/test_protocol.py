@@ -117,7 +117,7 @@ def test_nothing_travels_that_the_formulas_computed():
 
     What the file leaves out is left out.
     """
-    acting = (fourbar.Gravity(), fourbar.Viscous((("O2", 0.01),)))
+    acting = (fourbar.Gravity(), fourbar.Viscous.at(O2=0.01))
     scene = crank_rocker(effects=acting)
     data, text = protocol.scene_to_json(scene), fourbar.dump(scene)
     for number in numbers_of(data):

@@ -86,7 +86,7 @@ STILL = replace(
 """The same at a speed of each position: no motion through time."""
 DRY = replace(
     recommand(SCENE, angle=fourbar.Sweep(0.6, 0.75, 6)),
-    effects=(*CRANK_ROCKER.effects, Friction((("A", 0.05), ("O4", 0.05)))),
+    effects=(*CRANK_ROCKER.effects, Friction.at(A=0.05, O4=0.05)),
 )
 SPRING = Spring(Place(1, (0.1, -1.5)), Place(4, (0.08, 0.2)), 200.0, 0.05)
 SPRUNG = replace(

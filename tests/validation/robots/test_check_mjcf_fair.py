@@ -52,16 +52,16 @@ from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 ARM = FourBar(0.3, Bar(0.1, 0.2), Bar(0.25, 0.3), Bar(0.22, 0.3))
-SWEEP = fourbar.Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0)
+SWEEP = Motion(np.radians(np.linspace(30.0, 90.0, 61)), 1.0)
 DRY = Scene(ARM, SWEEP, effects=(Friction.at(O2=0.5, A=0.5),), title="dry friction")
 ROTOR = Scene(
     ARM,
-    fourbar.Motion(np.radians(np.linspace(30.0, 60.0, 31)), 10.0, 20.0),
+    Motion(np.radians(np.linspace(30.0, 60.0, 31)), 10.0, 20.0),
     effects=(Flywheel(0.02, 2),),
     title="a rotor",
 )
 BARE = replace(DRY, effects=())
-FAST = fourbar.Motion(np.radians(np.linspace(0.0, 120.0, 9)), 10.0)
+FAST = Motion(np.radians(np.linspace(0.0, 120.0, 9)), 10.0)
 TURNED = -4.0
 """Zero of a joint whose file counts from elsewhere, rad."""
 SOFT_FRICTION = 4e-6
@@ -386,7 +386,7 @@ def test_how_wrong_the_default_constraint_is_as_the_pages_say(name, off):
 
 PARALLELOGRAM = Scene(
     fourbar.uniform(0.3, 0.1, 0.3, 0.1),
-    fourbar.Motion(np.radians(np.linspace(10.0, 170.0, 33)), 2.0 * math.pi),
+    Motion(np.radians(np.linspace(10.0, 170.0, 33)), 2.0 * math.pi),
     effects=(fourbar.Gravity(),),
     title="a parallelogram near its change points",
 )

@@ -42,7 +42,7 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
-from tests.support.here import summary_of
+from tests.support.here import list_failed, summary_of
 from tests.support.scenes import crank_rocker, recommand, relink
 from tests.support.texts import put
 
@@ -346,8 +346,7 @@ def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
             numbers[quantity] = values + np.ptp(values) * ripple.reshape(values.shape)
 
     engine = Engine("plain", partial(Altered, spoil), EQUIVALENCE)
-    rows = judge("scene", HARD_TO_EXPLAIN[name], [engine]).rows
-    failed = {row.quantity for row in rows if row.failed}
+    failed = {row.quantity for row in list_failed(HARD_TO_EXPLAIN[name], [engine])}
     assert "F12" in failed and "all" not in failed
 
 
@@ -452,7 +451,7 @@ SLACK = Spring(
     50.0,
     0.1,
 )
-TORSION = Torsion((("O4", 2.0, 1.0, 0.0),))
+TORSION = Torsion.at(O4=(2.0, 1.0, 0.0))
 BOTH, ONE, SLIPPED, GRASPED = (
     Springs(springs)
     for springs in (
@@ -469,7 +468,7 @@ ACTING = {
     "effects.springs.0.length": (ONE, GRASPED),
     "effects.torsion.O4.rest": (
         TORSION,
-        Torsion((("O4", 2.0, 0.0, 0.0),)),
+        Torsion.at(O4=(2.0, 0.0, 0.0)),
     ),
     "effects.viscous.O4": (Viscous.at(O4=0.2),),
     "effects.torsion.O4.stiffness": (TORSION,),

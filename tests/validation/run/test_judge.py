@@ -29,7 +29,7 @@ from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
 from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
-from tests.support.here import judge_by, spoil_formulas
+from tests.support.here import judge_by, list_failed, spoil_formulas
 from tests.support.scenes import crank_rocker, find_angle
 
 
@@ -124,9 +124,8 @@ def test_positions_are_singular_only_where_bars_3_and_4_are_in_line(monkeypatch)
         solution.status_code[:2] = SINGULAR
 
     spoil_formulas(monkeypatch, withhold)
-    rows = judge("", crank_rocker(), [FREE_BODY]).rows
-    failed = [(row.quantity, row.error) for row in rows if row.failed]
-    assert ("status", 2.0) in failed
+    failed = list_failed(crank_rocker(), [FREE_BODY])
+    assert ("status", 2.0) in [(row.quantity, row.error) for row in failed]
 
 
 def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch):
@@ -137,10 +136,9 @@ def test_a_basis_that_breaks_down_is_no_agreement(monkeypatch):
         raise IndexError("lost")
 
     monkeypatch.setattr(FreeBody, "answer", broken)
-    failed = [row for row in judge("", crank_rocker(), others).rows if row.failed]
-    assert [(row.quantity, row.reason) for row in failed] == [
-        ("status", "the free bodies, by which it is judged, broke down")
-    ]
+    (row,) = list_failed(crank_rocker(), others)
+    words = "the free bodies, by which it is judged, broke down"
+    assert (row.quantity, row.reason) == ("status", words)
 
 
 AT_REST = 1

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Motion, Sweep, uniform
+from fourbar import Motion, Sweep, solve, uniform
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
@@ -108,7 +108,7 @@ def place_before_toggle(*distances):
 def test_beyond_a_toggle_no_engine_finds_a_position(engine):
     """The input is where it is commanded."""
     beyond = place_before_toggle(*(-distance for distance in TOGGLE))
-    assert not fourbar.solve(beyond).assembled.any()
+    assert not solve(beyond).assembled.any()
     answer = engine.start().answer(beyond, fourbar.command(beyond))
     assert not answer.assembled.any()
     for name in answer.quantities.keys() - OF_THE_INPUT:
@@ -144,7 +144,7 @@ def ask_nearby(scene, solution, command=None):
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2():
     scene = dress(families.ORDINARY_LENGTHS)
     asked = set_angles(scene, [0.7, 0.7 + 4.0 * 2.0**-52, 0.7 + 1e-13])
-    formulas = fourbar.solve(set_angles(scene, [0.7] * 3))
+    formulas = solve(set_angles(scene, [0.7] * 3))
     torque = ask_nearby(scene, formulas, fourbar.command(asked))["torque"]
     assert np.isfinite(torque).tolist() == [True, True, False]
 
@@ -155,7 +155,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas():
     1e-9 rad from a limit position a sine of the formulas is met to its last digit.
     """
     near = place_before_toggle(0.3, 1e-3, 1e-9)
-    formulas = fourbar.solve(near)
+    formulas = solve(near)
     sines = ask_nearby(near, formulas)["sin_mu"]
     np.testing.assert_allclose(sines, formulas.sin_mu, rtol=1e-15)
 
@@ -171,7 +171,7 @@ def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(kind
     for psi in points:
         for branch in (1, -1):
             near = set_angles(dress(lengths), psi + away, branch)
-            command, formulas = fourbar.command(near), fourbar.solve(near, "force")
+            command, formulas = fourbar.command(near), solve(near, "force")
             balls = ask_at(HARD_ENGINES[0].start(), near, command).quantities["F43"]
             again = ask_nearby(near, formulas)["F43"]
             size = magnitude(formulas.F43)
@@ -291,7 +291,7 @@ def test_power_and_acceleration_see_what_the_gap_does_not(monkeypatch):
 
     monkeypatch.setattr(simulate, "ClosedLoop", Stiff)
     answer = simulated(replace(RECIPE, time_constant_steps=0.5))
-    ours = fourbar.solve(SWEEP, at=answer.at).torque
+    ours = solve(SWEEP, at=answer.at).torque
     wrong = np.abs(answer.quantities["torque"] - ours)
     assert wrong.max() > 0.9 * np.abs(ours).max()
     assert answer.evidence["closure_gap_m"] < 1e-5 and not alarm(answer, "closure_gap")
@@ -352,7 +352,7 @@ def test_an_alarm_fails_its_row(monkeypatch):
 def test_a_free_motion_through_change_points_in_every_engine():
     """IFToMM A02, one window, ten seconds: lim.ii.udc.es/mbsbenchmark."""
     (name, scene), *_ = families.released(durations=(10.0,), steps=10)
-    theta_2 = fourbar.solve(scene).theta_2
+    theta_2 = solve(scene).theta_2
     assert abs(math.cos(theta_2[-1]) - 0.478385058) < 1e-9
     assert abs(math.sin(theta_2[-1]) - 0.878150179) < 1e-9
     rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
@@ -405,5 +405,5 @@ def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reache
 def test_a_driven_bar_stands_still_where_its_couple_has_a_pole(bar):
     (family,) = [one for one in HARD_FAMILIES if one.name == f"pole-T{bar}"]
     for label, scene in family.scenes():
-        speeds = np.abs(fourbar.solve(scene, "velocity")[f"omega_{bar}"])
+        speeds = np.abs(solve(scene, "velocity")[f"omega_{bar}"])
         assert speeds.min() < 1e-7 * speeds.max(), label

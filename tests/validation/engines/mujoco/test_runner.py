@@ -4,6 +4,7 @@ Motion laws and loads over theta_2.
 """
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -49,14 +50,8 @@ LAWS = {
         "free",
     ),
 }
-PART_OF_A_TURN = Load(
-    4,
-    (3.0, 0.7),
-    from_centre=(0.05, 1.0),
-    moment=0.2,
-    frame="bar",
-    table=Table((0.1, 1.0, 2.0), (2.0, -5.0, 2.0)),
-)
+OVER_A_PART = Table((0.1, 1.0, 2.0), (2.0, -5.0, 2.0))
+PART_OF_A_TURN = replace(ACTING["load"], table=OVER_A_PART)
 WHOLE_TURN = ACTING["load over theta_2"]
 
 

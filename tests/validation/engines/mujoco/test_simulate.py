@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fourbar
-from fourbar import Bar, Motion, Sweep
+from fourbar import Bar, Motion, Scene, Sweep, solve
 from fourbar.mjcf import RECIPE
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar_validation.compare.compare import Comparison, Demands
@@ -61,7 +61,7 @@ def simulate(posed):
 
 def compared(posed, answer):
     """Rows of the simulation against the formulas at the motion that it made."""
-    right = fourbar.solve(posed, at=answer.at)
+    right = solve(posed, at=answer.at)
     return Comparison(
         "",
         posed,
@@ -143,12 +143,12 @@ def test_a_change_point_is_a_declared_limit():
         ((0.4, 0.1, 0.25, 0.25 - 1e-10), True),
         ((0.3, 0.1, 0.3, 0.11), False),
     ):
-        posed = fourbar.Scene(fourbar.uniform(*lengths), motion)
+        posed = Scene(fourbar.uniform(*lengths), motion)
         refusal = simulate(posed).refusal
         assert (refusal is not None and "falls to 0.0" in refusal) == refused
     kite = fourbar.uniform(0.1, 0.1, 0.3, 0.3)
     passes = Motion(np.array([0.0, 1.0, 2.0, 3.0]), 1.0)
-    assert "falls to 0.0" in simulate(fourbar.Scene(kite, passes)).refusal
+    assert "falls to 0.0" in simulate(Scene(kite, passes)).refusal
 
 
 def test_a_law_that_is_back_where_it_began_takes_the_steps_of_its_way():
@@ -184,7 +184,7 @@ def hood(links, output=None):
         Bar(0.12, links if output is None else output),
     )
     motion = Motion(Sweep(0.8, 1.8, 12), 0.5)
-    return fourbar.Scene(
+    return Scene(
         linkage,
         motion,
         effects=(fourbar.Gravity(),),
@@ -312,7 +312,7 @@ def test_near_a_pole_of_the_drive_on_the_coupler_no_simulation_is_accused():
     At 1.5e-3 rad from where omega_3 vanishes T3 and every force diverge.
     """
     scene = draw_random_scene(2026, 2265, tuple(DrawnType))
-    assert np.nanmin(fourbar.solve(scene).drive_condition) < 0.003
+    assert np.nanmin(solve(scene).drive_condition) < 0.003
     assert not [row for row in judged(scene) if row.failed]
 
 
@@ -328,7 +328,7 @@ def test_error_falls_with_the_fourth_power_of_the_timestep():
         finer = {"timestep_scale": scale, "time_constant_steps": 80.0 / scale}
         simulated = MujocoSimulated(replace(RECIPE, **finer))
         answer = ask_at(simulated, posed, fourbar.command(posed))
-        right = fourbar.solve(posed, at=answer.at).F43
+        right = solve(posed, at=answer.at).F43
         return float(np.abs(answer.quantities["F43"] - right).max())
 
     order = math.log2(measure(4.0) / measure(2.0))

@@ -140,7 +140,7 @@ def test_rigid_pins_are_the_formulas_of_the_scene(case):
 @pytest.mark.slow
 def test_states_without_a_value_of_the_formulas_are_named_and_not_judged():
     """A spring that is at rest where the turn begins is wound from half of it on."""
-    spring = fourbar.Torsion((("O2", 2.0, 0.0, 0.1),))
+    spring = fourbar.Torsion.at(O2=(2.0, 0.0, 0.1))
     wound = replace(BARE, effects=(spring,))
     loop = measure(driven_by_a_motor(wound), wound)
     assert find_left_out(loop) < LEFT_OUT
