@@ -55,7 +55,7 @@ def draw(path: Path) -> None:
             axes.plot(degrees, torque, label=name, **look)
             peak = torque[np.abs(torque).argmax()]
             mark_peak(axes, degrees, torque, f"{peak:.3g} N m")
-        set_degree_ticks(axes.xaxis, 360.0)
+        set_degree_ticks(axes.xaxis)
         axes.set(
             xlabel=r"$\theta_2$ (°)",
             ylabel="$T_2$ (N m)",

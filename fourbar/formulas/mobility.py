@@ -228,11 +228,11 @@ def choose_range(
         return 0.0, TURN
     every = find_intervals(linkage, bar)
     start, stop = every[0]
-    for low, high in every:
-        if holding is not None and (holding - low) % TURN <= high - low:
-            start = low
-            stop = high
-            break
+    if holding is not None:
+        # two ranges have one width; a limit may lie on either side of an end
+        start, stop = min(
+            every, key=lambda ends: abs(math.remainder(holding - sum(ends) / 2, TURN))
+        )
     margin = min(margin, (stop - start) / _NARROW)
     return start + margin, stop - margin
 

@@ -567,9 +567,11 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     away = np.abs(panels.list_nodes().ravel()[rows] - solution.at.places[first])
     nearest = angles[rows[np.argmin(away)]]
     angles += TURN * np.round((coarse[first] - nearest) / TURN)
-    middles = [0.5 * (angles[part].min() + angles[part].max()) for part in stretches]
-    for stretch, middle in zip(stretches, middles, strict=True):
-        turns = (middles[0] - middle) / TURN
+    ends = angles[stretches[0]]
+    for stretch in stretches:
+        part = angles[stretch]
+        away = 0.5 * (ends.min() + ends.max()) - 0.5 * (part.min() + part.max())
         # half a turn away is no turn, whatever the rounding
-        angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * turns)
+        angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * away / TURN)
+        ends = np.append(ends, angles[stretch])
     curve.values = angles.reshape(curve.values.shape)

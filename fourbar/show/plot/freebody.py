@@ -191,9 +191,9 @@ def draw_free_bodies(figure: "SubFigure", view: View) -> None:
         axes.set_aspect("equal", adjustable="box")
         axes.spines[:].set_visible(False)
     view.note(
-        "Bars and forces each to one scale, in world axes; dashed: inertia forces −m a"
-        " at G (d'Alembert), with which the forces and the moments on each bar add up"
-        " to zero."
+        "Bars and forces each to one scale (a short arrow is its head alone), in"
+        " world axes; dashed: inertia forces −m a at G (d'Alembert), with which the"
+        " forces and the moments on each bar add up to zero."
     )
 
 

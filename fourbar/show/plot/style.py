@@ -284,9 +284,14 @@ def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:
 
 def set_degree_ticks(axis: Any, most: int = 8) -> None:
     """Set ticks at round numbers of degrees."""
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import MultipleLocator
 
-    axis.set_major_locator(MaxNLocator(most, steps=[1, 1.5, 2, 3, 4.5, 5, 6, 9, 10]))
+    span = float(np.ptp(axis.get_view_interval()))
+    for step in (1, 2, 5, 10, 15, 30, 45, 60, 90, 180, 360):
+        # finer and coarser ones are matplotlib's
+        if 1.0 < span <= most * step:
+            axis.set_major_locator(MultipleLocator(step))
+            return
 
 
 def place_legend(axes: "Axes", columns: int = 4) -> None:

@@ -342,6 +342,15 @@ def test_the_angles_of_two_stretches_cover_no_more_than_those_of_one():
         assert cover == approx(whole, abs=1e-6)  # a limit leaves the root of rounding
 
 
+def test_three_stretches_of_a_turn_cover_no_more_than_the_turn():
+    """The sweep begins inside one of two ranges and cuts it in two."""
+    motion = Motion(Sweep(pi / 4.0, -7.0 * pi / 4.0, 24))
+    facts = Facts(solve(Scene(bare(0.3, 0.31, 0.14, 0.11), motion)))
+    low, high = facts.angles[4]
+    assert len(facts.motion.stretches) == 3
+    assert high.value - low.value <= tau + 1e-6  # a limit leaves the root of rounding
+
+
 def test_angles_have_the_turn_of_the_first_position():
     """Bar 4 passes 180 deg between that and the first node of the curves."""
     bars = bare(*CRANK_ROCKER_LENGTHS)
