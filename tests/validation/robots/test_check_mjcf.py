@@ -657,14 +657,15 @@ def test_a_setting_that_is_finer_is_no_difference(key, finer):
 
 def test_what_to_type_is_advised_where_a_setting_differs():
     rows = rows_with(0.05, 0.3)
-    for key, written, advised in (
-        ("option.timestep", "option timestep", 1),
-        ("option.timestep", "", 0),  # an SDF has no place for it
-        ("lift.output", "body gravcomp", 0),
-    ):
+    for key, written, advised in read_rows("""
+option.timestep | option timestep | 1
+# an SDF has no place for it
+option.timestep | | 0
+lift.output | body gravcomp | 0
+"""):
         listed = [Difference(key, 0.0, 1.0, "", written)]
         sentences = LoopJudgement(None, listed, rows, {}, []).sentences()  # type: ignore[arg-type]
-        assert sum("advise SCENE FILE" in text for text in sentences) == advised
+        assert sum("advise SCENE FILE" in text for text in sentences) == int(advised)
 
 
 def test_an_error_stands_before_that_of_the_generated_file():

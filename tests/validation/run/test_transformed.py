@@ -28,6 +28,7 @@ from fourbar_validation.run import transformed
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import TRANSFORMATIONS, check_transformed
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
+from tests.support.rows import read_rows
 from tests.support.scenes import ON_COUPLER, crank_rocker
 
 EVERYTHING = (
@@ -122,26 +123,26 @@ def test_what_cannot_be_stated_otherwise_is_said_with_its_reason(scene, lines):
     assert ask(scene)[0].left_out == lines
 
 
-CHANGE_POINTS = {
-    "parallelogram": (0.3, 0.1, 0.3, 0.1),
-    "kite, a = b": (0.1, 0.1, 0.3, 0.3),
-    "kite, a = d": (0.2, 0.2, 0.35, 0.35),
-    "rhombus": (0.2, 0.2, 0.2, 0.2),
-    "crank-rocker": (0.3, 0.1, 0.25, 0.15),
-}
-"""Lengths of ground, input, coupler and output of linkages whose bars come in line."""
-
-
 def make_linkage(d, *lengths):
     bars = [Bar(length, 0.8, centre=(0.3 * length, 0.2)) for length in lengths]
     return fourbar.FourBar(d, *bars, ground_angle=0.4)
 
 
 @pytest.mark.parametrize("command", [2, 3, 4])
-@pytest.mark.parametrize("lengths", CHANGE_POINTS.values(), ids=CHANGE_POINTS)
+@pytest.mark.parametrize(
+    "name, lengths",
+    read_rows("""
+parallelogram | 0.3 0.1 0.3 0.1
+kite, a = b | 0.1 0.1 0.3 0.3
+kite, a = d | 0.2 0.2 0.35 0.35
+rhombus | 0.2 0.2 0.2 0.2
+crank-rocker | 0.3 0.1 0.25 0.15
+"""),
+)
 def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
-    lengths, command
+    name, lengths, command
 ):
+    """Lengths of ground, input, coupler and output, whose bars come in line."""
     judged = 0
     # a sweep of each quarter, in the turn of the ground's angle and in two others
     quarters = np.arange(0.2, 2.0 * np.pi, 0.5 * np.pi)
@@ -150,7 +151,9 @@ def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
         angles = Sweep(start, start + 1.5, 5)
         stated = {f"theta_{command}": angles, f"omega_{command}": 1.3}
         motion = Motion(**stated, branch=branch)
-        scene = Scene(make_linkage(*lengths), motion, effects=(Gravity(),))
+        scene = Scene(
+            make_linkage(*map(float, lengths.split())), motion, effects=(Gravity(),)
+        )
         try:
             held = list_held(scene)
         except InputError as error:

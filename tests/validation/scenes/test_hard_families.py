@@ -48,6 +48,7 @@ from fourbar_validation.scenes.hard_families import (
 from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED
 from tests.support.here import judge_by, spoil_formulas
+from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker, recommand
 from tests.validation.run.test_judge import rows_of
 
@@ -357,22 +358,22 @@ def test_a_free_motion_through_change_points_in_every_engine():
     assert abs(math.sin(theta_2[-1]) - 0.878150179) < 1e-9
     rows = {(row.engine, row.quantity): row for row in judge(name, scene).rows}
     assert all(row.passed for row in rows.values())
-    for engine, quantity, most in (
-        ("pinocchio-forward", "theta_2", 1e-8),
-        ("pinocchio-forward", "energy", 1e-9),
-        ("mujoco-forward", "theta_2", 1e-3),
-        ("mujoco-forward", "energy", 1e-5),
-    ):
-        assert rows[engine, quantity].error < most
+    for engine, quantity, most in read_rows("""
+pinocchio-forward | theta_2 | 1e-8
+pinocchio-forward | energy | 1e-9
+mujoco-forward | theta_2 | 1e-3
+mujoco-forward | energy | 1e-5
+"""):
+        assert rows[engine, quantity].error < float(most)
 
 
 @pytest.mark.parametrize(
     "name, why",
-    [
-        ("speeds-+1e+6", "mjMAXVAL"),
-        ("toggle-double-rocker-0-folded-open", "below 0.05"),
-        ("speeds-+1e+3", ""),
-    ],
+    read_rows("""
+speeds-+1e+6 | mjMAXVAL
+toggle-double-rocker-0-folded-open | below 0.05
+speeds-+1e+3 |
+"""),
 )
 def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name, why):
     suite = Hard()

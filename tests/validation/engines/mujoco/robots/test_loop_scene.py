@@ -103,18 +103,18 @@ def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
 
 
 @pytest.mark.parametrize(
-    ("pin", "low", "high"),
-    [
-        ("O2", -200, 200),
-        ("O2", 0, 400),
-        ("O2", -720, 720),
-        ("A", -100, 100),
-        ("A", -181, 181),
-        ("A", -200, 200),
-        ("O4", -20, 20),
-    ],
+    "pin, limits",
+    read_rows("""
+O2 | -200 200
+O2 | 0 400
+O2 | -720 720
+A | -100 100
+A | -181 181
+A | -200 200
+O4 | -20 20
+"""),
 )
-def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, low, high):
+def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, limits):
     planar = Planar()
     p = {name: complex(*place) for name, place in planar.pins.items()}
     turned = np.linspace(-math.tau, math.tau, 20001)
@@ -123,14 +123,15 @@ def test_the_range_goes_both_ways_from_the_pose_but_for_at_most_a_turn(pin, low,
     B = meet_circles(at, p["O4"], b, c)
     lines = {"A": (B - at) / np.exp(1j * turned), "O4": B - p["O4"]}
     hinge = np.unwrap(np.angle(lines[pin])) if pin in lines else turned
-    hinge = np.degrees(hinge - hinge[len(turned) // 2])
+    hinge = hinge - hinge[len(turned) // 2]
+    low, high = np.radians([*map(float, limits.split())]).tolist()
     outside = turned[(hinge < low) | (hinge > high)]
     first = max([-math.tau, *outside[outside < 0.0]])
     last = min([math.tau, *outside[outside > 0.0]])
     start = max(first, min(0.0, last - math.tau))
 
-    limits = f'range="{math.radians(low)} {math.radians(high)}"'
-    text = planar.text().replace(f'name="{pin}"', f'name="{pin}" {limits}', 1)
+    ranged = f'name="{pin}" range="{low} {high}"'
+    text = planar.text().replace(f'name="{pin}"', ranged, 1)
     made = read_scene(text)
     grid = math.radians(0.51)
     width = min(last - start, math.tau)
