@@ -27,6 +27,7 @@ from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.here import THROUGH_TIME
 from tests.validation.cost.test_cost import turning
+from tests.validation.engines.mujoco.test_simulate import hood
 
 
 @pytest.fixture
@@ -210,19 +211,8 @@ def test_exact_engines_stay_exact():
 @pytest.mark.slow
 def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     """Each scene is made so that one setting carries it."""
-    bars = (
-        fourbar.Bar(0.10, 0.01),
-        fourbar.Bar(0.08, 14.5, 5.0, (1.0, 0.2)),
-        fourbar.Bar(0.12, 0.01),
-    )
-    motion = fourbar.Motion(fourbar.Sweep(0.8, 1.8, 12), 0.5)
-    hood = fourbar.Scene(
-        fourbar.FourBar(0.11, *bars),
-        motion,
-        effects=(fourbar.Gravity(),),
-    )
     for scene, setting, why in (
-        (hood, "the stiffness by pads", "lighter of coupler and output"),
+        (hood(0.01), "the stiffness by pads", "lighter of coupler and output"),
         (turning(10.0, 36), "the timestep", "the steps themselves"),
     ):
         setup = JudgedSetup(scene)

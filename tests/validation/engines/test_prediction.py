@@ -30,7 +30,7 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import _bound_touching, predict_from_data
-from fourbar_validation.engines.registry import ENGINES, Engine, make_prediction
+from fourbar_validation.engines.registry import Engine, list_engines, make_prediction
 from fourbar_validation.engines.tree import solve_closed, solve_multipliers
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.judge_engines import compare_answer
@@ -159,7 +159,7 @@ def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(name, scene):
     """
     pytest.importorskip(name.split("-", maxsplit=1)[0])
     command = fourbar.command(scene)
-    (engine,) = (engine for engine in ENGINES if engine.name == name)
+    engine = list_engines()[name]
     answer = engine.start().answer(scene, command)
     exact = BallArithmetic().answer(scene, command).quantities
     predict = make_prediction(
@@ -208,7 +208,7 @@ def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
         size = magnitude(getattr(solution, quantity))[20]
         predicted = predict(driven, quantity)[20]
         assert 4.0 * EPS * size < predicted < 1e3 * EPS * size, quantity
-    engine = next(engine for engine in ENGINES if engine.name == "free-body")
+    engine = list_engines()["free-body"]
     answer = FreeBody().answer(driven, command)
     assert make_prediction(engine, driven, command, answer) is not None
 
@@ -217,7 +217,7 @@ def test_a_motion_is_predicted_under_pin_friction_and_its_forces_are_not():
     friction = fourbar.PinFriction.at(O4=(0.15, 0.006))
     scene = crank_rocker(effects=(friction,))
     at = fourbar.command(scene)
-    (engine,) = [one for one in ENGINES if one.name == "free-body"]
+    engine = list_engines()["free-body"]
     predict = make_prediction(engine, scene, at, engine.start().answer(scene, at))
     everywhere = np.ones(len(at.angle), dtype=bool)
     assert np.isfinite(predict("alpha_4", everywhere)).any()

@@ -291,7 +291,9 @@ def test_what_is_none_is_refused_in_one_line(part, text):
     assert str(raised.value) and "\n" not in str(raised.value)
 
 
-WRONG_SETTINGS = read_rows("""
+@pytest.mark.parametrize(
+    ("text",),
+    read_rows("""
 []
 {"name": 1}
 {"steps_per_turn": 3.5}
@@ -300,10 +302,8 @@ WRONG_SETTINGS = read_rows("""
 {"error": "small"}
 {"steps_per_turn": 9, "error": 0.1}
 {"timestep": 0.1}
-""")
-
-
-@pytest.mark.parametrize("text", [text for (text,) in WRONG_SETTINGS])
+"""),
+)
 def test_a_setting_that_is_none_is_refused_in_one_line(text):
     words = r"^setting = [^\n]*: must be an object with name, and steps_per_turn"
     with raises(InputError, match=words):

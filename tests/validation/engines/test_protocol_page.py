@@ -3,7 +3,6 @@ what both sides write and read.
 """
 
 import json
-import re
 import subprocess
 import sys
 
@@ -25,25 +24,22 @@ from fourbar_validation.compare.tolerance import (
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.places import MODELS
+from tests.support.checkout import read
+from tests.support.guests import PLAIN
 from tests.support.scenes import crank_rocker
 from tests.validation.engines.test_protocol import (
     scenes,
 )
-from tests.whole.test_imports import ROOT
 
-PAGE = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
-SCHEMA = json.loads(
-    (ROOT / "docs" / "protocol.schema.json").read_text(encoding="utf-8")
-)
+SCHEMA = json.loads(read("docs/protocol.schema.json"))
 NAMED = (*sorted(MODELS.glob("*.toml")), *sorted(MODELS.glob("textbook/*.toml")))
 
 
 @pytest.fixture
 def engine(tmp_path):
     """The page's engine, as a reader saves it."""
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     file = tmp_path / "engine.py"
-    file.write_text(code)
+    file.write_text(PLAIN)
     return file
 
 

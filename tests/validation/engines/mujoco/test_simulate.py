@@ -31,7 +31,7 @@ from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.here import THROUGH_TIME, judge_by
-from tests.support.scenes import crank_rocker, thesis
+from tests.support.scenes import crank_rocker, recommand, thesis
 from tests.support.shares import slow_but
 from tests.validation.engines.test_engines import commanded, driven
 
@@ -94,12 +94,9 @@ def test_slow_linkages_hold_as_well(loaded, index):
     as much cancels, as beyond bar 2 of the first scene, have no digit at 1e-5.
     """
     drawn = draw_random_scene(7, index, tuple(DrawnType))
-    slow = replace(
-        drawn,
-        motion=drawn.motion.replace(speed=0.001 if loaded else 0.01, acceleration=0.0),
-        drive=None,
-        drive_bar=2,
-    )
+    speed = 0.001 if loaded else 0.01
+    moved = recommand(drawn, speed=speed, acceleration=0.0)
+    slow = replace(moved, drive=None, drive_bar=2)
     posed = slow if loaded else replace(slow, loads=(), effects=())
     answer = simulate(posed)
     rows = compared(posed, answer)
