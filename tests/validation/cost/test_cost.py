@@ -35,6 +35,7 @@ from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
+from tests.support.checkout import read
 from tests.support.costs import point
 from tests.support.scenes import CYLINDER, crank_rocker, recommand
 from tests.support.shares import slow_but
@@ -349,7 +350,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("drive, column", [(2, 1), (4, 3)])
 def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
-    page = (MODELS.parent / "docs" / "cost.md").read_text(encoding="utf-8")
+    page = read("docs/cost.md")
     rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
     assert len(rows) == 3
     scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=drive)

@@ -38,10 +38,10 @@ from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
 HERE = "tests.support.hostile_class:"
-FILE = ROOT / "tests" / "support" / "hostile_class.py"
+FILE = ROOT / "tests/support/hostile_class.py"
 TORQUE = '"torque": moments[0] - cross(r2, F32)'
 OFF = (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))')
-SCRIPT = ROOT / "tests" / "support" / "plain_engine.mjs"
+SCRIPT = ROOT / "tests/support/plain_engine.mjs"
 TURN = Motion(Sweep(0.1, 6.38, 8), 10.0)
 SCENE = crank_rocker(motion=TURN, loads=())
 ROCKING = crank_rocker(motion=Motion(theta_4=Sweep(1.8, 2.5, 8), omega_4=3.0))
@@ -53,7 +53,7 @@ STROKE = crank_rocker(
 
 def place_of(text):
     """The file and the line of the hostile class that has a text."""
-    lines = FILE.read_text(encoding="utf-8").splitlines()
+    lines = FILE.read_text("utf-8").splitlines()
     (number,) = (i for i, line in enumerate(lines, 1) if text in line)
     return f"({FILE}, line {number})"
 

@@ -11,8 +11,8 @@ import pytest
 
 from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
+from tests.support.checkout import read
 from tests.validation.report.test_report import copies, report
-from tests.whole.test_imports import ROOT
 
 pytest.importorskip(
     "selenium",
@@ -93,7 +93,7 @@ def test_all_text_is_readable(browse, dark):
     require_contrast(driver)
     assert driver.find_elements("css selector", "svg")
     assert driver.execute_script(PAPERS) == []
-    page = (ROOT / "docs" / "examples" / "benchmark.html").read_text()
+    page = read("docs/examples/benchmark.html")
     require_contrast(browse(page[: page.index("</table>")], dark=dark))
 
 

@@ -70,7 +70,7 @@ def test_options_that_do_not_go_together_are_refused():
 
 def test_what_the_digits_of_a_file_leave_open_is_said(tmp_path):
     file = tmp_path / "foot.xml"
-    file.write_text(FOOT_PARALLELOGRAM, encoding="utf-8")
+    file.write_text(FOOT_PARALLELOGRAM, "utf-8")
     checked = call(check_mjcf, str(file), "-o", str(tmp_path))
     assert checked.return_value == 0, checked.output
     said = join_lines(checked)

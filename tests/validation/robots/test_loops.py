@@ -79,14 +79,14 @@ def test_a_scene_is_written_that_the_formulas_solve(tmp_path):
 def test_meshes_that_are_missing_are_counted_in_the_scene(tmp_path):
     geoms = "".join(f'<geom type="mesh" mesh="m{i}"/>' for i in range(150))
     meshes = "".join(f'<mesh name="m{i}" file="m{i}.stl"/>' for i in range(150))
-    text = (ROBOTS / "biped_foot.xml").read_text(encoding="utf-8")
+    text = (ROBOTS / "biped_foot.xml").read_text("utf-8")
     text = text.replace("<worldbody>", f"<asset>{meshes}</asset><worldbody>{geoms}", 1)
     robot = tmp_path / "foot.xml"
-    robot.write_text(text, encoding="utf-8")
+    robot.write_text(text, "utf-8")
     out = tmp_path / "foot.toml"
     result = call(robot, "-o", out)
     assert result.exception is None, result.output
-    said = out.read_text(encoding="utf-8").replace("\n# ", " ")
+    said = out.read_text("utf-8").replace("\n# ", " ")
     assert "are left out: 150, the first of them m0.stl" in said
     assert fourbar.load(out).linkage.ground > 0.0
 

@@ -652,10 +652,10 @@ def test_what_contradicts_itself_is_refused_in_one_line(old, new, message, compi
 
 def test_a_model_that_is_missing_and_in_no_loop_is_left_out_and_named(tmp_path):
     path = tmp_path / "world.sdf"
-    path.write_text(changed(CRANK, f"{CRANK}{NOWHERE}</include>"), encoding="utf-8")
+    path.write_text(changed(CRANK, f"{CRANK}{NOWHERE}</include>"), "utf-8")
     file = read_robot(path)
     assert "models that are missing are left out: model://nowhere" in file.notes
-    path.write_text(PLAIN, encoding="utf-8")
+    path.write_text(PLAIN, "utf-8")
     assert file.text == read_robot(path).text
 
 
@@ -673,7 +673,7 @@ def test_a_step_beyond_the_end_of_a_motion_meets_no_stop(tmp_path):
 @pytest.mark.parametrize("way", ["plain", "loop joint of a URDF"])
 def test_settings_are_not_asked_of_a_file_that_cannot_state_them(way, tmp_path):
     path = tmp_path / "robot.sdf"
-    path.write_text(STATED[way], encoding="utf-8")
+    path.write_text(STATED[way], "utf-8")
     judgement = judge_path("linkage", SCENE, path)
     written = {one.key: one.write() for one in judgement.differences}
     assert "in the file" not in written["closure.solimp"]

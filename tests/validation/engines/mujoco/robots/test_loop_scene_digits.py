@@ -152,7 +152,7 @@ def test_a_file_that_mujoco_saved_is_read_as_the_one_that_was_written(tmp_path):
     assert classify(read_scene(exact).scene.linkage).name == "parallelogram"
     saved = tmp_path / "saved.xml"
     mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_string(exact))
-    made = read_scene(saved.read_text(encoding="utf-8"))
+    made = read_scene(saved.read_text("utf-8"))
     assert list_equal(made)
     assert made.scene.linkage.lengths == approx((0.14, 0.06) * 2, rel=2e-6)
     assert classify(made.scene.linkage).name == "parallelogram"
