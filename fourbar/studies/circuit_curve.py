@@ -35,6 +35,7 @@ from fourbar.formulas.position import Loop, Position, half_angle, loop
 from fourbar.quantities import Array
 from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import Sweep
+from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse
 from fourbar.studies.passing import say_nowhere
@@ -113,7 +114,8 @@ class CircuitCurve:
     leads to the mirror image.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, which: int = 0) -> None:
+        """Take a circuit of the scene's motion, by its place among those `passed`."""
         at, linkage = of_input(scene), scene.linkage
         self.scene, self.case = scene, Case.of(scene)
         self.lengths, self.theta_1 = loop(*linkage.lengths), linkage.ground_angle
@@ -127,13 +129,20 @@ class CircuitCurve:
         if scene.counts_turns:  # from the first position on
             assembly = np.full_like(at.branch, at.branch[0])
             self.case = self.case.begin_with(at._replace(branch=assembly))
-        self.number = int(numbers[numbers >= 0][0])
+        self.swept: Solution | None = None
+        """Close positions of a sweep or a law; None: there is neither."""
+        if isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None:
+            self.swept = MotionCourse(scene, "position").solution
+            numbers = find_circuit(linkage, self.swept.theta_2, self.swept.branch)
+        self.passed = list(dict.fromkeys(numbers[numbers >= 0].tolist()))
+        """Indices of the circuits that the motion passes, in its order."""
+        self.number: int = self.passed[which]
         """Index of the circuit."""
         circuit = circuits(linkage)[self.number]
-        self.full = turns_fully(linkage)
-        singular = change_points(linkage)
-        self.branch = int(at.branch[0]) if singular else circuit.branches[0]
-        """Branch of a row without limits."""
+        self.full, singular = turns_fully(linkage), change_points(linkage)
+        first = int(at.branch[0])
+        self.branch = first if first in circuit.branches else -first
+        """Branch of a row without limits, of others that of the first position."""
         turns = int(count_turns(linkage.lengths, 2)) if self.full else 1
         self.period = turns * TURN
         """Angle of the whole row, rad."""
@@ -145,9 +154,10 @@ class CircuitCurve:
         """Least psi of a sweep or a law, else where psi is counted from, rad."""
         self.extent = math.inf
         """Extent of theta_2 in a sweep or a law, rad; inf: there is none."""
-        if isinstance(scene.motion.angle, Sweep) or scene.motion.law is not None:
-            self.start = float(at.theta_2.min()) - self.theta_1
-            self.extent = float(np.ptp(at.theta_2))
+        if self.swept is not None:
+            theta_2 = self.swept.theta_2[(numbers == self.number) | (numbers < 0)]
+            self.start = float(np.nanmin(theta_2)) - self.theta_1
+            self.extent = float(np.nanmax(theta_2) - np.nanmin(theta_2))
         self.middle = self.start + 0.5 * min(self.extent, self.period)
         """Place of psi within half a period of which theta_2 is counted, rad."""
         self.grid = np.linspace(0.0, self.period, self.positions, endpoint=False)
@@ -173,9 +183,9 @@ class CircuitCurve:
         The others have the same theta_2 on the other side of a limit or change point
         at which the sweep does not arrive.
         """
-        if self.extent == math.inf:
+        swept = self.swept
+        if swept is None:
             return np.ones(len(tau), dtype=bool)
-        swept = MotionCourse(self.scene, "position").solution
         points = np.stack([swept.theta_2 - self.theta_1, swept.branch], axis=1)
         passes = self._holds(swept.theta_2, swept.branch)
         places = self.tau(points)

@@ -13,10 +13,11 @@ Fundamentals of Vibrations, ch. 2.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, Self
+from itertools import chain
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,9 @@ class Equilibria(NamedTuple):
     """Result of `equilibrium`."""
 
     found: tuple[Equilibrium, ...]
-    """Along theta_2, the open branch first; none where the linkage is indifferent."""
+    """Circuit by circuit in the order of the motion, in each along theta_2, the open
+    branch first; none where the linkage is indifferent.
+    """
     indifferent: tuple[tuple[RestPosition, RestPosition], ...]
     """Ends of ranges in which Q is zero throughout. Zero is within the rounding of the
     description: the linkage stays wherever it is put.
@@ -136,14 +139,14 @@ class Equilibria(NamedTuple):
 def equilibrium(scene: Scene) -> Equilibria:
     """Find the positions in which a linkage stays by itself, and their stability.
 
-    The result also says what holds the linkage elsewhere. The search covers the circuit
-    of the scene's first position that assembles, on both branches where the circuit has
-    both. If the scene states a sweep (of theta_2, of another bar or of a stroke) or a
-    motion law, the search stays within the angles theta_2 of it, and `reached` tells
-    apart what the sweep itself passes. Speed, acceleration and drive of the scene play
-    no part, nor does viscous damping. Torsion springs are followed from the scene's
-    first position; without a sweep an input that turns fully gets from there to the
-    others either way round, and what no way reaches is no equilibrium. Zeros of the
+    The result also says what holds the linkage elsewhere. The search covers the
+    circuits that the scene's motion passes, each on both branches where it has both. If
+    the scene states a sweep (of theta_2, of another bar or of a stroke) or a motion
+    law, the search stays within the angles theta_2 of it, and `reached` tells apart
+    what the sweep itself passes. Speed, acceleration and drive of the scene play no
+    part, nor does viscous damping. Torsion springs are followed from the scene's first
+    position; without a sweep an input that turns fully gets from there to the others
+    either way round, and what no way reaches is no equilibrium. Zeros of the
     generalized force Q are sought between the positions of a grid (3600 a turn, and the
     ends of the sweep): where Q changes its sign, and where its size is least.
 
@@ -154,28 +157,36 @@ def equilibrium(scene: Scene) -> Equilibria:
     """
     expect("scene", scene, Scene)
     with np.errstate(all="ignore"):
-        curve = CircuitCurve(scene)
-        level = _list_ranges(curve, curve.level, _A_RANGE)
-        samples = curve.samples()
-        places, sizes = _find_zeros(curve, samples)
-        order = curve.order(places)
-        order = order[~_mark_wound(curve, places[order])]
-        held: list[_CircuitRange] = []
-        if any(term.dry_pins for term in curve.case.terms):
-            held = _list_ranges(curve, partial(_holds, curve), 0, places[order])
-        found = []
-        for place, size in zip(places[order], sizes[order], strict=True):
-            found.append(_describe_equilibrium(curve, place, float(size), held))
-        positions = _solve_at_rest(curve)
-        return Equilibria(
-            tuple(found),
-            tuple(part.ends for part in level if part.is_reached),
-            len(samples),
-            tuple(map(curve.place, curve.singular)),
-            tuple(part.ends for part in held if part.is_reached),
-            positions,
-            _find_moves(curve, positions),
-        )
+        first = CircuitCurve(scene)
+        others = range(1, len(first.passed))
+        curves = [first, *(CircuitCurve(scene, which) for which in others)]
+        of_each = zip(*map(_search, curves), strict=True)
+        found, level, samples, singular, held = (tuple(chain(*of)) for of in of_each)
+        positions = _solve_at_rest(first)
+        moves = _find_moves(first, positions)
+    return Equilibria(found, level, len(samples), singular, held, positions, moves)
+
+
+def _search(curve: CircuitCurve) -> tuple[Iterable[Any], ...]:
+    """Return what `Equilibria` lists of a circuit, and the places of its grid."""
+    level = _list_ranges(curve, curve.level, _A_RANGE)
+    samples = curve.samples()
+    places, sizes = _find_zeros(curve, samples)
+    order = curve.order(places)
+    order = order[~_mark_wound(curve, places[order])]
+    held: list[_CircuitRange] = []
+    if any(term.dry_pins for term in curve.case.terms):
+        held = _list_ranges(curve, partial(_holds, curve), 0, places[order])
+    found = []
+    for place, size in zip(places[order], sizes[order], strict=True):
+        found.append(_describe_equilibrium(curve, place, float(size), held))
+    return (
+        found,
+        [part.ends for part in level if part.is_reached],
+        samples,
+        map(curve.place, curve.singular),
+        [part.ends for part in held if part.is_reached],
+    )
 
 
 def _mark_wound(curve: CircuitCurve, tau: Array) -> NDArray[np.bool_]:
@@ -188,7 +199,7 @@ def _mark_wound(curve: CircuitCurve, tau: Array) -> NDArray[np.bool_]:
         points = curve.points(tau)
         passed = curve.reached(tau)
         if curve.extent == math.inf and not curve.full:
-            passed &= np.sin(points[:, 1]) * curve.at.branch[0] > 0.0
+            passed &= np.sin(points[:, 1]) * curve.branch > 0.0
         theta_2 = curve.theta_1 + curve.count(points[passed, 0])
         wound[passed] = _is_wound(curve, _turn_to(curve, theta_2))
     return wound
@@ -199,7 +210,7 @@ def _is_wound(curve: CircuitCurve, theta_2: Array) -> NDArray[np.bool_]:
 
     The spring is followed from the scene's first position that assembles.
     """
-    branch = np.full(theta_2.shape, curve.at.branch[0], dtype=np.int8)
+    branch = np.full(theta_2.shape, curve.branch, dtype=np.int8)
     state = curve.case.at(Command(theta_2, branch, 0.0, 0.0))
     codes = np.array(
         [term.status(state, branch) for term in curve.case.terms if term.counts_turns]

@@ -422,6 +422,22 @@ def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
         assert_array_equal(curve.reached(curve.tau(points)), passed & (branch == 1))
 
 
+@pytest.mark.parametrize(
+    ("bar", "lengths"), [(2, (0.1, 0.09, 0.04, 0.085)), (4, (0.3, 0.1, 0.25, 0.22))]
+)
+def test_a_sweep_past_two_circuits_has_an_equilibrium_in_each(bar, lengths):
+    ground, *others = lengths
+    linkage = FourBar(ground, *(Bar(length, 1.0) for length in others))
+    swept = {f"theta_{bar}": Sweep(0.0, TURN, 720), f"omega_{bar}": 0.0}
+    scene = Scene(linkage, Motion(**swept), effects=(DOWN,))
+    s = solve(scene)
+    (rows,) = np.nonzero(s.torque[1:] * s.torque[:-1] < 0.0)
+    found = [rest.place for rest in equilibrium(scene).found if rest.reached]
+    at = [getattr(place, f"theta_{bar}") % TURN for place in found]
+    assert at == approx(s.at.angle[rows] + TURN / 1440, abs=TURN / 1440)
+    assert len(found) == 2
+
+
 def test_equilibria_are_printed_in_the_units_of_the_file(show):
     text, pound, inch = dump(crank_as_pendulum(DOWN)), 0.45359237, 0.0254
     assert 'ground = "0.3 m"' in text
