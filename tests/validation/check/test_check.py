@@ -1070,6 +1070,7 @@ COARSE = read_rows(r"""
 60,0.1,6.36 | 1 | 1 of 2 numbers agree
 60,1e-99999999,6.36 | 1 | 1 of 2 numbers agree
 1e308,1e308, | 1 | Nothing was compared
+68,0.4,\n100,-0.0391, | 1 | 1 of 1 numbers agree, compared to 3 digits; no digit
 137,-0.6,\n200,-0.61, | 0 | compared to 2 digits
 137,-0.603,\n200,-0.61, | 0 | compared to 2 digits
 103.76,,2\n79.18,0.281,3.00 | 0 | 3 of 3 numbers agree, compared to 2
