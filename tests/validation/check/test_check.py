@@ -922,6 +922,17 @@ def test_a_factor_with_a_plain_name_is_named_in_a_table_of_one_row(judged):
         assert judged(OURS, row, ["torque"]).explanations[0].text == name
 
 
+def test_an_input_is_named_before_a_calculation_that_explains_as_much(judged):
+    scene = replace(OURS, loads=(), effects=())
+    heavier = bars(scaled(mass=2.0), "output")(scene)
+    texts = [one.text for one in judged(scene, heavier, ["torque"]).explanations]
+    assert texts[:2] == [
+        "bars.output.mass doubled",
+        "bars.output: inertia about the pin used as the inertia about G",
+    ]
+    assert any("alpha x r is doubled in a_G of bar 4" in text for text in texts)
+
+
 def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
     numbers = bars(scaled(inertia=0.98), "output")(OURS)
     *_, third, second, _ = sorted(abs(numbers["torque"] / right(OURS)["torque"] - 1.0))

@@ -29,7 +29,7 @@ from fourbar_validation.check.variants import (
     solve_other,
     state_all,
 )
-from fourbar_validation.check.wrong_scenes import DONE, group_numbers
+from fourbar_validation.check.wrong_scenes import group_numbers
 from fourbar_validation.compare.tolerance import wrap_difference
 from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
@@ -315,8 +315,6 @@ def _scale(
 ) -> Mistake:
     numbers = {key: factor * value for key, value in group.items()}
     text = f"{name} {factor:.6g} times ours {FITTED}"
-    if done := DONE.get(factor):
-        text = f"{name} {done}"
     return solve_other(text, replace_numbers(scene, numbers), at)
 
 

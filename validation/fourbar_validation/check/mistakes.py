@@ -232,9 +232,9 @@ def explain(
 ) -> list[Explanation]:
     """Find the mistakes under which nine tenths of what differs agrees.
 
-    The most complete come first. Fitted numbers are left out if a mistake of the
-    calculation with a plain name explains all. Such a mistake breaks no quantity that
-    agreed as it was; those of columns count together.
+    The most complete come first, of these the plainest. A fitted number is left out if
+    a mistake of the calculation with a plain name explains as much. Such a mistake
+    breaks no quantity that agreed as it was; those of columns count together.
     """
     least = ENOUGH_EXPLAINED * len(differing)
     found: list[Explanation] = []
@@ -250,11 +250,9 @@ def explain(
                 )
                 if not any(map(explanation.narrows, found)):
                     found.append(explanation)
-        if any(explanation.complete for explanation in found):
-            break
     plain = [one for one in found if not one.text.endswith(FITTED)]
-    if any(one.complete and one.whole for one in plain):
-        found = plain
+    most = max((len(one.quantities) for one in plain if one.whole), default=0)
+    found = [one for one in found if one in plain or len(one.quantities) > most]
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
         found = [one for one in found if one.whole]
@@ -314,10 +312,9 @@ def _list_explained(
 
 _SOURCES: tuple[Callable[[Judge, list[JudgedColumn]], Iterator[Mistake]], ...] = (
     lambda judge, differing: list_column_mistakes(judge.right),
-    lambda judge, differing: find_miscalculated(judge),
     lambda judge, differing: list_hypotheses(judge.scene, judge.at),
     list_rates_of_rows,
+    lambda judge, differing: find_miscalculated(judge),
     find_fitted,
 )
-"""Sources of mistakes, the cheapest first: one is asked if none before it explains all.
-"""
+"""Sources of mistakes, the plainest first."""

@@ -23,7 +23,7 @@ from fourbar_validation.scenes.bars import list_moving
 
 _PLACE_UNITS = ("m", "rad")
 """Units of numbers that say where and in which direction something acts."""
-DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
+_DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
 """Factors on numbers of a scene, and what was done to them."""
 _CENTIMETRES = "m a and I alpha in kg cm/s^2 and kg cm^2/s^2, added to N and N cm"
 _MILLIMETRES = "m a and I alpha in kg mm/s^2 and kg mm^2/s^2, added to N and N mm"
@@ -72,28 +72,31 @@ def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
 
 
 def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """List scenes in place of one that states every number, by the mistake.
-
-    Of numbers that are no places the fit of a factor finds what is not left out.
-    """
-    groups = group_numbers(scene, places=False)
-    for name, group in groups.items():
-        yield f"{name} left out", replace_numbers(scene, dict.fromkeys(group, 0.0))
-    if scene.loads and any(name.startswith("effects") for name in groups):
+    """List scenes in place of one that states every number, the plainest first."""
+    multiples = dict(_list_multiples(scene, places=False))
+    if scene.loads and any(text.startswith("effects") for text in multiples):
         bare = replace(scene, loads=(), effects=())
         yield "loads and effects left out: inertia alone", bare
-    for text, numbers in (*_list_wrong_numbers(scene), *_list_wrong_bars(scene)):
+    for text, numbers in (
+        *multiples.items(),
+        *_list_wrong_numbers(scene),
+        *_list_wrong_bars(scene),
+        *_list_multiples(scene, places=True),
+    ):
         yield text, replace_numbers(scene, numbers)
-    for name, group in group_numbers(scene, places=True).items():
-        for factor, done in DONE.items():
-            other = {key: factor * value for key, value in group.items()}
-            yield f"{name} {done}", replace_numbers(scene, other)
     for text, loads in _list_wrong_loads(scene):
         yield text, replace(scene, loads=loads)
     for bar in MOVING_BARS:
         if scene.drive is None and bar != scene.drive_bar:
             text = f"the torque acts on bar {bar} instead of bar {scene.drive_bar}"
             yield text, replace(scene, drive_bar=bar)
+
+
+def _list_multiples(scene: Scene, places: bool) -> Iterator[tuple[str, Numbers]]:
+    """List numbers of a scene left out, doubled or reversed."""
+    for name, group in group_numbers(scene, places).items():
+        for factor, done in _DONE.items():
+            yield f"{name} {done}", {key: factor * x for key, x in group.items()}
 
 
 def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
@@ -109,7 +112,6 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         along_y = {"effects.gravity.0": 9.81, "effects.gravity.1": -math.pi / 2.0}
         yield "gravity along -y is included though the scene has none", along_y
     with_ground = gravity.angle + scene.linkage.ground_angle
-    yield "effects.gravity reversed", {"effects.gravity.0": -gravity.magnitude}
     yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
     yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
 
