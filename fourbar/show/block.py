@@ -45,7 +45,7 @@ from fourbar.show.driving import describe_drive, name_places
 from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import MotionCurves, acts, find_drive_rounding
-from fourbar.show.panels import LOWER, TIED, UPPER
+from fourbar.show.panels import LOWER, TIED, UPPER, Peak
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import (
     COMMON,
@@ -366,7 +366,10 @@ class SceneBlock(Facts):
         return "; ".join([begin, *swings])
 
     def _write_swing(self, bar: int) -> str:
-        low, high = self.angles[bar]
+        swings = [self._write_range(bar, *ends) for ends in self.angles[bar]]
+        return " and, in the other circuit, ".join(swings)
+
+    def _write_range(self, bar: int, low: Peak, high: Peak) -> str:
         width = high.value - low.value
         if self.kind == "turn" and width > 2.0 * math.pi - 1e-9:
             return "turns fully"
@@ -434,7 +437,7 @@ class SceneBlock(Facts):
             yield _row("to start", f"{row}, against dry friction")
         yield from self._write_stroke()
         yield from self._write_power()
-        if self.pressure is not None and self.stroke_range is not None:
+        if self.pressure is not None and self.stroke_ranges:
             yield from self._write_bore(self.pressure)
 
     def _write_peak(self) -> str:
@@ -602,11 +605,15 @@ class SceneBlock(Facts):
 
     def _write_stroke(self) -> Iterator[str]:
         """Write the stroke, over what it assembles, and its speed."""
-        if self.stroke_range is None:
+        if not self.stroke_ranges:
             return
-        ends = [end.value for end in self.stroke_range]
-        low, high = (self._value(end, "m", self.longest) for end in ends)
-        row = low if self.kind == "position" else f"{low} to {high}"
+        ranges = [
+            [self._value(end.value, "m", self.longest) for end in ends]
+            for ends in self.stroke_ranges
+        ]
+        row = " and, in the other circuit, ".join(map(" to ".join, ranges))
+        if self.kind == "position":
+            row = ranges[0][0]
         if self.stroke_limits is not None:
             limits = (self._value(x, "m", self.longest) for x in self.stroke_limits)
             row += f"; assembles from {' to '.join(limits)}"

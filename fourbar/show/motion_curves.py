@@ -12,9 +12,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
-from fourbar.formulas.mobility import TURN
+from fourbar.formulas.mobility import TURN, find_circuit
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
@@ -233,6 +234,17 @@ class MotionCurves:
         places = positions.list_nodes().ravel()
         assembles = np.isfinite(positions.curves["sin_mu"].values[..., 0]).ravel()
         return [] if assembles.all() else list_stretches(assembles, places)
+
+    @cached_property
+    def of_circuits(self) -> list[Panels]:
+        """Curves of `positions` in each circuit that the motion passes, in its order.
+
+        The linkage does not move from one to the other.
+        """
+        numbers = _find_circuits(self.positions, self.scene).max(axis=1)
+        passed = dict.fromkeys(numbers[numbers >= 0].tolist())
+        others = [numbers == 1 - number for number in passed or [0]]
+        return list(map(self.positions.leave_out, others))
 
 
 def describe_motion(solution: Solution) -> MotionCurves:
@@ -546,12 +558,20 @@ def _find_longest_arm(solution: Solution) -> float:
     return 1.0
 
 
+def _find_circuits(panels: Panels, scene: Scene) -> NDArray[np.int8]:
+    """Return the index of the circuit at each node, (p, N); -1 where there is none."""
+    theta_2, sines = (panels.curves[name].values for name in ("theta_2", "sin_mu"))
+    branch = np.where(sines.ravel() < 0.0, -1, 1).astype(np.int8)
+    numbers = find_circuit(scene.linkage, theta_2.ravel(), branch)
+    return numbers.reshape(theta_2.shape[:2])
+
+
 def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     """Add whole turns to an angle on the panels, so that they belong together.
 
     The first stretch has the angles of the solution. The linkage does not pass from one
     stretch to the next, so that no turn of a later one follows from the first: it has
-    the one that lies nearest.
+    the one that lies nearest those of its circuit.
     """
     name = f"theta_{bar}"
     if solution.commanded == name:
@@ -567,11 +587,13 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
     away = np.abs(panels.list_nodes().ravel()[rows] - solution.at.places[first])
     nearest = angles[rows[np.argmin(away)]]
     angles += TURN * np.round((coarse[first] - nearest) / TURN)
-    ends = angles[stretches[0]]
+    numbers = _find_circuits(panels, solution.scene).ravel()
+    ends_of: dict[int, Array] = {}
     for stretch in stretches:
         part = angles[stretch]
+        ends = ends_of.get(numbers[stretch[0]], angles[stretches[0]])
         away = 0.5 * (ends.min() + ends.max()) - 0.5 * (part.min() + part.max())
         # half a turn away is no turn, whatever the rounding
         angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * away / TURN)
-        ends = np.append(ends, angles[stretch])
+        ends_of[numbers[stretch[0]]] = np.append(ends, angles[stretch])
     curve.values = angles.reshape(curve.values.shape)

@@ -8,7 +8,7 @@ largest value and no integral.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -168,6 +168,14 @@ class Panels:
         for name, values in curves.items():
             single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
         return cls(places, places, share, single, located=False)
+
+    def leave_out(self, panels: NDArray[np.bool_]) -> "Panels":
+        """Return the curves without values in some of the panels, (p,)."""
+        curves = {}
+        for name, curve in self.curves.items():
+            values = np.where(panels[:, None, None], np.nan, curve.values)
+            curves[name] = replace(curve, values=values)
+        return replace(self, curves=curves)
 
     @property
     def length(self) -> float:

@@ -126,18 +126,20 @@ class Facts:
         return first, last
 
     @cached_property
-    def angles(self) -> dict[int, tuple[Peak, Peak]]:
-        """Smallest and largest angle of bars 2, 3 and 4."""
-        return {bar: self._find_range(f"theta_{bar}") for bar in MOVING_BARS}
+    def angles(self) -> dict[int, list[tuple[Peak, Peak]]]:
+        """Smallest and largest angle of bars 2, 3 and 4 in each circuit."""
+        return {bar: self._find_ranges(f"theta_{bar}") for bar in MOVING_BARS}
 
     @cached_property
-    def stroke_range(self) -> tuple[Peak, Peak] | None:
-        """Smallest and largest stroke of the motion."""
-        return None if self.solution.stroke is None else self._find_range("stroke")
+    def stroke_ranges(self) -> list[tuple[Peak, Peak]]:
+        """Smallest and largest stroke in each circuit; empty without a stroke."""
+        return [] if self.solution.stroke is None else self._find_ranges("stroke")
 
-    def _find_range(self, name: str) -> tuple[Peak, Peak]:
-        positions = self.motion.positions
-        return positions.find_peak(name, LOWER), positions.find_peak(name, UPPER)
+    def _find_ranges(self, name: str) -> list[tuple[Peak, Peak]]:
+        return [
+            (panels.find_peak(name, LOWER), panels.find_peak(name, UPPER))
+            for panels in self.motion.of_circuits
+        ]
 
     @cached_property
     def drive(self) -> Driving | None:

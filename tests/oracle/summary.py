@@ -261,7 +261,7 @@ def _summarize_scene(question):
 def _judge_ranges(judged):
     """Judge the ends of the ranges of all bars, and the smallest transmission angle."""
     for bar in MOVING_BARS:
-        low, high = judged.facts.angles[bar]
+        ((low, high),) = judged.facts.angles[bar]
         there = judged.ask([low.place, high.place]).quantities[f"theta_{bar}"]
         fine = np.unwrap(judged.fine.quantities[f"theta_{bar}"])
         fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))

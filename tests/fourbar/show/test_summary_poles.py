@@ -166,7 +166,7 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
         assert poles == approx(places, abs=LOCATED)
         written = " and ".join(f"{degrees(pole):.4g} deg" for pole in poles)
         assert head + written.replace("-0 ", "0 ") in text
-        sized = scene.drive is None or facts.stroke_range is not None
+        sized = scene.drive is None or bool(facts.stroke_ranges)
         assert ("none is enough, as the" in text) == sized
 
 
@@ -219,7 +219,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
         facts = find_facts(sweep(lengths, *np.radians([start, stop])))
         assembled = facts.solution.assembled
         for bar in (2, 4):
-            low, high = facts.angles[bar]
+            ((low, high),) = facts.angles[bar]
             angles = facts.solution[f"theta_{bar}"][assembled]
             assert low.value - LOCATED <= angles[0] <= high.value + LOCATED
             if assembled.all():
