@@ -54,7 +54,8 @@ _TURNING_SENSE = re.compile(r"\b(c?cw|clockwise)$", re.IGNORECASE)
 """A sense of turning after a unit: the sign states it."""
 _GLUED = re.compile(r"(kg|g|N)(m|mm|cm)(?=$|[\^²*])")
 """kgm^2: a product without a sign between its factors."""
-RAISED_TEXT = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+RAISED_TEXT = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+|(?<=[A-Za-z])[23](?![0-9])")
+"""A power: a raised one, or the 2 of kg m2. No unit's name ends in 2 or 3."""
 SUPERSCRIPT_DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _FRACTION = re.compile(
     r"([+-]?)(?:([0-9]{1,6})[ -])?([0-9]{1,6})/([1-9][0-9]{0,5})(?=[ A-Za-z'\"′″]|$)"

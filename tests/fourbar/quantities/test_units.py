@@ -178,6 +178,11 @@ CONVERTED = read_rows("""
 15 kg·m²·s⁻² | N m | 15
 10 kgm^2 | kg m^2 | 10
 10 kgm² | kg m^2 | 10
+10 kgm2 | kg m^2 | 10
+88500 kg mm2 | kg m^2 | 0.0885
+-26 rad/s2 | rad/s^2 | -26
+7.8 g/cm3 | kg/m^3 | 7800
+2 g0 | m/s^2 | 19.6133
 12 1/2 in | m | 0.3175
 12-1/2" | m | 0.3175
 12.5 in. | m | 0.3175
@@ -227,6 +232,7 @@ inf m
 1 m**2**9
 1 ((cm^9)^9)^9
 1 cm²²
+1 cm22
 1 m + 1 m
 1 m; import os
 1 __import__('os')

@@ -1043,7 +1043,7 @@ def with_comma(theta, torque):
         ("Theta_2 [DEG],Torque [N M]",),
         ("Crank angle (deg)\tMotor torque (N-m)", "{theta:.0f}\t{torque:.9e}"),
         ("theta2 [deg],T [N·m]",),
-        ("theta_2 [deg],torque,alpha_2", "{theta:.0f},{torque:.9e},0"),
+        ("theta_2,torque,alpha_2\ndeg,N m,rad/s2", "{theta:.0f},{torque:.9e},0"),
     ],
 )
 def test_an_ordinary_table_is_read(form, torques):

@@ -499,9 +499,7 @@ def _is_unit_line(cells: list[str]) -> bool:
 
     No cell of it contains a number.
     """
-    return not any(
-        re.search("[0-9]", re.sub(r"[\^*][0-9]|[²³]", "", cell)) for cell in cells
-    )
+    return not any(re.search(r"(?<![A-Za-z^*])(?<!\^-)[0-9]", cell) for cell in cells)
 
 
 def _read_heading(
