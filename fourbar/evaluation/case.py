@@ -38,7 +38,7 @@ for the squares by which `withhold_infinite` looks for what is no number.
 NEEDS_DIGITS = 32.0 * U
 """A factor of Heron's formula smaller than this times the square of the sum of the
 lengths is evaluated in many digits: in doubles it is wrong by at most about 24 U times
-that, and one within 8 U of it is a limit.
+that, and one within 4 U of it is a limit.
 """
 LARGEST_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the

@@ -503,10 +503,10 @@ class _Triangle(NamedTuple):
             sides = first, second, third
             return vanish(exact_difference(*sides, 0.0 * length), sides)
 
-        near = exceed(stroke, reach, length) * exceed(stroke, length, reach)
-        far = exceed(length, reach, stroke) * (length + reach + stroke)
         with np.errstate(all="ignore"):
-            near = np.sqrt(near)
+            near = exceed(stroke, reach, length) * exceed(stroke, length, reach)
+            far = exceed(length, reach, stroke) * (length + reach + stroke)
+            near = np.sqrt(select(stroke >= 0.0, near, np.nan))
             far = np.sqrt(far)
             beta = 2.0 * np.arctan2(near, far)
             lever = near * far / (2.0 * stroke)

@@ -74,7 +74,8 @@ def find_starts(solution: Solution) -> Array:
     at = solution.at
     at_rest = lacks_friction(solution) & (at.speed == 0.0)
     largest = float(np.nanmax(np.abs(at.acceleration), initial=0.0))
-    return np.asarray(at_rest * np.sign(drop_rounding(at.acceleration, largest)))
+    growth = drop_rounding(at.acceleration, largest)
+    return np.where(at_rest, np.sign(growth), 0.0)
 
 
 def leaves_range(solution: Solution) -> Any:

@@ -140,7 +140,8 @@ class MotionCurves:
         """
         solution = self.solution
         held = lacks_friction(solution) & (solution.at.speed == 0.0)
-        if solution.time is not None or not held.any():
+        moves = solution.time is not None and np.any(solution.at.speed)
+        if moves or not held.any():
             return [self]
         if find_starts(solution)[held].all():
             return [self.started]
@@ -162,7 +163,7 @@ class MotionCurves:
         """
         scene = self.scene
         at = self.solution.at
-        if self.panels.located:
+        if self.panels.located and scene.motion.law is None:
             senses = np.sign(scene.motion.acceleration) or sense
             motion = scene.motion.replace(speed=_BEGINNING * senses)
             scene = replace(scene, motion=motion)
@@ -172,7 +173,11 @@ class MotionCurves:
             begun = _BEGINNING * np.where(senses == 0.0, sense, senses)
             stated: Any = at.speed
             at = at._replace(speed=np.where(stated == 0.0, begun, stated))
-        return describe_motion(solve(scene, at=at))
+        begins = solve(scene, at=at)
+        if scene.motion.law is not None:  # it rests all the time
+            panels = _take_positions(begins, _list_curves)
+            return replace(self, solution=begins, panels=panels)
+        return describe_motion(begins)
 
     @cached_property
     def start(self) -> Peak | None:

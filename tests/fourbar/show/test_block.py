@@ -336,6 +336,22 @@ drive.bar = 4
 effects.friction.O2 = "0.5 N m"
 says = ["to start grows without bound at theta_2 = 38.61 deg, against"]
 never = "holds"
+["a law that stands still"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+motion.law = { time = ["0 s", "1 s"], theta_2 = ["50 deg", "50 deg"], ends = "rest" }
+effects.friction.O2 = "0.5 N m"
+says = ["at rest -500 mN m to 500 mN m"]
+never = "to start"
+["at rest at the limit of a stroke"]
+lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
+motion.stroke = ["0.34 m", "0.2 m"]
+motion.side = "left"
+motion.stroke_speed = "0 m/s"
+drive.from = { bar = 1, from_pin = ["0.25 m", "-160 deg"] }
+drive.to = { bar = 2, from_pin = ["0.09 m", "0.17 rad"] }
+effects.friction.O2 = "0.5 N m"
+says = ["holds"]
+never = "to start"
 ["a drive that brakes more than it drives"]
 lengths = { ground = "0.3 m", input = "0.1 m", coupler = "0.25 m", output = "0.22 m" }
 bars.input = { mass = "2 kg", centre = ["0.1 m", "0 deg"] }

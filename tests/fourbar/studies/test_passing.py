@@ -26,6 +26,7 @@ from fourbar import (
 from fourbar.effects import Table
 from fourbar.errors import (
     FourBarError,
+    InputError,
     NotAssembledError,
     state_messages_in,
 )
@@ -199,6 +200,8 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
         assert str(raised.value) == said
     other = recommand(scene, side="left")
     assert say_range(other) == "this cylinder can have 0.0508 to 0.1016 m"
+    with raises(InputError, match="this cylinder can have"):
+        command_at(other, np.array([-0.0762]))
     narrow = ROCKER_WITH_RAM.replace('"7 in"', '"10.3 in"').replace("-60 deg", "90 deg")
     none = loads(narrow.replace('"right"', '"left"'))
     assert say_range(none) == "this cylinder can have none with motion.side = left"
