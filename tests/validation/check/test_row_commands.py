@@ -111,21 +111,33 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
         assert [finding.line for finding in found.differing] == lines
 
 
-def test_rows_that_round_to_the_scenes_own_positions_are_at_them(read):
-    """A sweep of steps of 20/3 deg, printed to two decimals; 47 deg is none of it."""
-    motion = Motion(Sweep(0.0, math.radians(120.0), 18), 10.0)
-    scene = crank_rocker(motion=motion)
-    right = solve(scene)
-    degrees, torque = np.degrees(right.theta_2)[1::4], right.torque[1::4]
-    for form, differ in ((".2f", 0), (".0f", 0), (".1f", 5)):
-        shift = 0.1 if form == ".1f" else 0.0
-        angles = [format(angle + shift, form) for angle in degrees]
+@pytest.mark.parametrize(
+    "name, form, shift",
+    read_rows("""
+theta_2 [deg] | .2f | 0
+theta_2 [deg] | .0f | 0
+theta_2 [deg] | .1f | 0.1
+time | .3f | 0
+time | .3f | 0.001
+"""),
+)
+def test_rows_that_round_to_the_scenes_own_positions_are_at_them(
+    name, form, shift, read
+):
+    """A sweep of steps of 20/3 deg, and times along a law; 47 deg is none of it."""
+    swept = crank_rocker(motion=Motion(Sweep(0.0, math.radians(120.0), 18), 10.0))
+    for scene in (swept, SERVO)[: 1 + (name == "time")]:
+        right = solve(scene)
+        places = np.degrees(right.theta_2)
+        if name == "time":
+            places = right.theta_2 / 10.0 if scene is swept else right.time
         rows = [
-            f"{angle},{x!r}" for angle, x in zip(angles, torque.tolist(), strict=True)
+            f"{place + float(shift):{form}},{torque!r}"
+            for place, torque in zip(places, right.torque.tolist(), strict=True)
         ]
-        table = read("\n".join(["theta_2 [deg],torque", *rows]))
-        findings = Judge(scene, table).findings
-        assert sum(not one.agrees for one in findings) == differ
+        table = read("\n".join([f"{name},torque", *rows[1 :: len(rows) // 4]]))
+        agree = {one.agrees for one in Judge(scene, table).findings}
+        assert agree == {shift == "0"}
 
 
 @pytest.mark.parametrize("ends, side", [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)])

@@ -51,15 +51,18 @@ def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands
     Raises InputError for a time that the law does not have.
     """
     law: Any = scene.motion.law
+    own: Any = compute_times(scene, base)
     if law is not None:
+        own = base.time
         first, *_, last = law.time
-    elif (starts := compute_times(scene, base)) is not None:
+    elif own is not None:
         first, last = -math.inf, math.inf
         places, *rates = base.stated
-        start = places[np.argmin(starts)]
+        start = places[np.argmin(own)]
     else:
         wanted = f"needs a column {base.commanded}: the scene has no motion over time"
         raise InputError("table", "time", wanted)
+    table = _move_to_own(own, table)
     printed = table.places
     beyond = np.abs(printed - np.clip(printed, first, last)) > table.place.rounding
     if beyond.any():
@@ -124,9 +127,8 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     base = base._replace(**stated)
     if not commanded:
         found = RowCommands(base) if same else _find_by_another_bar(scene, table, base)
-    elif not same and (own := _find_own_positions(base, table)) is not None:
-        found = RowCommands(_command_each(base, own, scene))
     else:
+        table = table if same else _move_to_own(base.angle, table)
         at = base if same else _command_each(base, table.places, scene)
 
         def command_at(shift: Array | float) -> Command:
@@ -301,19 +303,26 @@ def _command_each(base: Command, angle: Array, scene: Scene) -> Command:
     return Command(angle, branch, base.speed, base.acceleration, bar=base.bar)
 
 
-def _find_own_positions(base: Command, table: TheirTable) -> Array | None:
-    """Return the scene's positions that all rows round to; None if it may be chance."""
-    angles = np.sort(base.angle)
-    if angles[0] == angles[-1]:
-        return None
+def _move_to_own(own: Array, table: TheirTable) -> TheirTable:
+    """Return the table at the scene's places that all rows round to, which are exact.
+
+    It is the same table if it may be chance.
+    """
+    own = np.sort(own)
+    if own[0] == own[-1]:
+        return table
     half = table.place.rounding
-    after = np.clip(np.searchsorted(angles, table.places), 1, len(angles) - 1)
-    lower, upper = angles[after - 1], angles[after]
+    after = np.clip(np.searchsorted(own, table.places), 1, len(own) - 1)
+    lower, upper = own[after - 1], own[after]
     nearest = np.where(table.places - lower < upper - table.places, lower, upper)
-    step = np.ptp(angles) / (len(angles) - 1)
+    step = np.ptp(own) / (len(own) - 1)
     rounds = np.abs(nearest - table.places) <= half * (1.0 + _ONE_PLACE)
     by_chance = np.prod(np.minimum(half, 0.5 * step) / (0.5 * step))
-    return nearest if rounds.all() and by_chance < _BY_CHANCE else None
+    if not rounds.all() or by_chance >= _BY_CHANCE:
+        return table
+    exact = np.zeros_like(half)
+    place = table.place._replace(values=nearest, rounding=exact, filled=exact)
+    return replace(table, place=place)
 
 
 def _has_positions_of(scene: Scene, table: TheirTable, base: Command) -> bool:

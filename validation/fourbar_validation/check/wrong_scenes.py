@@ -73,7 +73,7 @@ def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
 
 def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """List scenes in place of one that states every number, the plainest first."""
-    multiples = dict(_list_multiples(scene, places=False))
+    multiples = dict(_multiply_numbers(scene, places=False))
     if scene.loads and any(text.startswith("effects") for text in multiples):
         bare = replace(scene, loads=(), effects=())
         yield "loads and effects left out: inertia alone", bare
@@ -81,7 +81,7 @@ def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         *multiples.items(),
         *_list_wrong_numbers(scene),
         *_list_wrong_bars(scene),
-        *_list_multiples(scene, places=True),
+        *_multiply_numbers(scene, places=True),
     ):
         yield text, replace_numbers(scene, numbers)
     for text, loads in _list_wrong_loads(scene):
@@ -92,7 +92,7 @@ def list_wrong_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
             yield text, replace(scene, drive_bar=bar)
 
 
-def _list_multiples(scene: Scene, places: bool) -> Iterator[tuple[str, Numbers]]:
+def _multiply_numbers(scene: Scene, places: bool) -> Iterator[tuple[str, Numbers]]:
     """List numbers of a scene left out, doubled or reversed."""
     for name, group in group_numbers(scene, places).items():
         for factor, done in _DONE.items():
