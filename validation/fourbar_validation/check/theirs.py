@@ -28,6 +28,7 @@ from unicodedata import normalize
 import numpy as np
 
 from fourbar.errors import InputError
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
 from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
@@ -59,6 +60,7 @@ _OF_TORQUE = (
     "t2",
     "t3",
     "t4",
+    "t12",
     "moment",
     "drehmoment",
     "antriebsmoment",
@@ -83,7 +85,11 @@ _OTHER_NAMES = {
 """Names that other programs and languages use, or other spellings, in small letters,
 without spaces and underscores.
 """
-_BY_UNIT = {"t": {"time": "s", "torque": "N m"}, "m": {"torque": "N m"}}
+_BY_UNIT = {
+    "t": {"time": "s", "torque": "N m"},
+    "m": {"torque": "N m"},
+    **{f"w{bar}": {f"omega_{bar}": "rad/s"} for bar in MOVING_BARS},
+}
 """Letters, spelled as in _OTHER_NAMES, and what they mean by the unit beside them."""
 _REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
 """Pin forces on the other bar, and those that they are the opposite of."""
