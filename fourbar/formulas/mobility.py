@@ -335,15 +335,25 @@ def find_circuit(
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
     """
     theta_2 = np.asarray(theta_2, dtype=float)
+    path = prepare_path(linkage.lengths, linkage.ground_angle)
+    half = path.half_angle(theta_2)
+    assembles = (half.outer >= 0.0) & (half.inner >= 0.0)
+    return find_circuit_where(assembles, linkage, theta_2, branch)
+
+
+def find_circuit_where(
+    assembles: NDArray[np.bool_],
+    linkage: FourBar,
+    theta_2: Array,
+    branch: int | NDArray[np.int8],
+) -> NDArray[np.int8]:
+    """Return the index in `circuits` of positions known to assemble, else -1."""
     every = circuits(linkage)
     is_second: NDArray[np.bool_] | bool = False
     if len(every[0].branches) == 1:
         is_second = np.not_equal(branch, every[0].branches)
     elif len(every) == 2:  # their ranges are mirror images in the ground's line
         is_second = (theta_2 - linkage.ground_angle) % TURN >= 0.5 * TURN
-    path = prepare_path(linkage.lengths, linkage.ground_angle)
-    half = path.half_angle(theta_2)
-    assembles = (half.outer >= 0.0) & (half.inner >= 0.0)
     return np.where(assembles, is_second, -1).astype(np.int8)
 
 

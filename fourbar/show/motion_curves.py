@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
-from fourbar.formulas.mobility import TURN, find_circuit
+from fourbar.formulas.mobility import TURN, find_circuit_where
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
@@ -248,7 +248,7 @@ class MotionCurves:
         """
         numbers = _find_circuits(self.positions, self.scene).max(axis=1)
         passed = dict.fromkeys(numbers[numbers >= 0].tolist())
-        others = [numbers == 1 - number for number in passed or [0]]
+        others = [numbers == 1 - number for number in passed]
         return list(map(self.positions.leave_out, others))
 
 
@@ -565,10 +565,11 @@ def _find_longest_arm(solution: Solution) -> float:
 
 def _find_circuits(panels: Panels, scene: Scene) -> NDArray[np.int8]:
     """Return the index of the circuit at each node, (p, N); -1 where there is none."""
-    theta_2, sines = (panels.curves[name].values for name in ("theta_2", "sin_mu"))
-    branch = np.where(sines.ravel() < 0.0, -1, 1).astype(np.int8)
-    numbers = find_circuit(scene.linkage, theta_2.ravel(), branch)
-    return numbers.reshape(theta_2.shape[:2])
+    theta_2, sines = (
+        panels.curves[name].values[..., 0] for name in ("theta_2", "sin_mu")
+    )
+    branch = np.where(sines < 0.0, -1, 1).astype(np.int8)
+    return find_circuit_where(np.isfinite(sines), scene.linkage, theta_2, branch)
 
 
 def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.formulas.mobility import TURN
+from fourbar.formulas.mobility import TURN, find_circuit_where
 from fourbar.quantities import Array
 from fourbar.solution import Solution, shift_to_drawing
 from fourbar.studies.course import MotionCourse, states_single_positions
@@ -48,21 +48,32 @@ class Path(NamedTuple):
 def measure_paths(solution: Solution) -> dict[str, Path]:
     """Measure the path of each point over the motion of a solved scene.
 
-    Nothing is measured of a scene that states single positions.
+    A motion that passes both circuits has a path in each, as the linkage does not move
+    from one to the other. Nothing is measured of a scene that states single positions.
     """
     scene = solution.scene
     if not scene.points or states_single_positions(scene.motion):
         return {}
     course = MotionCourse(scene, "position", solution)
-    if not course.solution.assembled.any():
-        return {}
-    return {point.name: _measure_path(course, point.name) for point in scene.points}
+    numbers = _find_circuits(course.solution)
+    passed = dict.fromkeys(numbers[numbers >= 0].tolist())
+    return {
+        point.name + where: _measure_path(course, point.name, number)
+        for point in scene.points
+        for number, where in zip(passed, ("", " in the other circuit"), strict=False)
+    }
 
 
-def _measure_path(course: MotionCourse, name: str) -> Path:
+def _find_circuits(solution: Solution) -> NDArray[np.int8]:
+    return find_circuit_where(
+        solution.assembled, solution.scene.linkage, solution.theta_2, solution.branch
+    )
+
+
+def _measure_path(course: MotionCourse, name: str, circuit: int) -> Path:
     """Measure a path, dividing the steps beside its extremes round by round."""
     places = course.places
-    points = _locate_point(course, name, places)
+    points = _locate_point(course, name, circuit, places)
     for number in range(ROUNDS):
         if len(places) > MOST_PLACES:
             break
@@ -75,7 +86,7 @@ def _measure_path(course: MotionCourse, name: str) -> Path:
         between = (first + (places[steps + 1, None] - first) * inside).ravel()
         # all stay: without the others another direction would seem narrower
         places = np.concatenate([places, between])
-        points = np.concatenate([points, _locate_point(course, name, between)])
+        points = np.concatenate([points, _locate_point(course, name, circuit, between)])
         order = np.argsort(places)
         places = places[order]
         points = points[order]
@@ -86,10 +97,14 @@ def _measure_path(course: MotionCourse, name: str) -> Path:
     return _measure_points(places, points, np.isin(places, stated))
 
 
-def _locate_point(course: MotionCourse, name: str, places: Array) -> Array:
-    """Return a point at places of the motion, (n, 2)."""
+def _locate_point(
+    course: MotionCourse, name: str, circuit: int, places: Array
+) -> Array:
+    """Return a point at places of the motion, (n, 2); NaN in the other circuit."""
     solution = course.solve(places)
-    return shift_to_drawing(solution, solution.points[name])
+    points = shift_to_drawing(solution, solution.points[name])
+    beyond = _find_circuits(solution) == 1 - circuit
+    return np.where(beyond[:, None], np.nan, points)
 
 
 def _list_extremes(points: Array, missed: float) -> NDArray[np.intp]:

@@ -1,6 +1,6 @@
 """Extents of paths, against closed forms and a scan of directions."""
 
-from math import cos, radians, sin
+from math import acos, cos, radians, sin
 
 import numpy as np
 import pytest
@@ -74,6 +74,19 @@ def test_the_arc_of_a_crank_has_its_chord_and_its_sagitta(motion, ends):
         assert path.ends == (0.0, 1.0)
     else:
         assert np.degrees(path.ends) == approx(ends)
+
+
+def test_a_turn_past_two_circuits_has_an_arc_in_each():
+    """From A to O4 it is 210 mm to 390 mm, output less coupler to both."""
+    motion = 'theta_2 = { from = "0 deg", to = "360 deg", steps = 7 }'
+    text = CRANK.replace("100 mm", "350 mm").replace("250 mm", "90 mm")
+    paths = measure_paths(solve(loads(text.replace("220 mm", "300 mm") + motion)))
+    low, high = (acos((35**2 + 30**2 - e**2) / (2 * 35 * 30)) for e in (21, 39))
+    half = 0.5 * (high - low)
+    assert [*paths] == ["P", "P in the other circuit"]
+    for path in paths.values():
+        assert path.stroke == approx(0.16 * sin(half), abs=1e-12)
+        assert path.straightness == approx(0.08 * (1.0 - cos(half)), abs=1e-12)
 
 
 @pytest.mark.slow
