@@ -692,10 +692,15 @@ def command_at(scene: Scene, places: Array) -> Command:
     bar = motion.bar
     if motion.commanded == "stroke":
         at = command_stroke(scene, places, *motion.find_rates(places))
-        outside = places[np.isnan(at.angle)]
-        if outside.size:
-            stroke = float(outside[0])
-            raise InputError("motion.stroke", stroke, say_range(scene), unit="m")
+        outside = places[np.isnan(at.angle)].tolist()
+        if outside:
+            keys = {}  # of what is typed
+            if isinstance(motion.angle, Sweep):
+                keys[motion.angle.stop] = "motion.stroke.to"
+                keys[motion.angle.start] = "motion.stroke.from"
+            stroke = next(filter(keys.get, outside), outside[0])
+            key = keys.get(stroke, "motion.stroke")
+            raise InputError(key, stroke, say_range(scene), unit="m")
         return at
     branch = np.full(places.shape, motion.branch, dtype=np.int8)
     if motion.law is None:

@@ -483,9 +483,9 @@ lengths = { ground = "6 in", input = "2 in", coupler = "3 in", output = "2 in" }
 motion = { theta_2 = "99 deg", free = { duration = "1 s", steps = 9 } }
 bars.input.mass = "1 lb"
 ---
-motion.stroke = 1 in: this cylinder can have 2 to 4 in
+motion.stroke.to = 5 in: this cylinder can have 2 to 4 in
 lengths = { ground = "5 in", input = "2 in", coupler = "4 in", output = "4.5 in" }
-motion = { stroke = "1 in", side = "left", stroke_speed = "1 in/s" }
+motion = { stroke = { from = "3 in", to = "5 in", steps = 9 }, side = "left" }
 [drive]
 from = { bar = 1, from_pin = ["3 in", "-60 deg"] }
 to = { bar = 2, from_pin = ["1 in", "0 deg"] }
