@@ -37,6 +37,9 @@ def find_limit_met(parts: Iterable[MovingPart]) -> str:
     return ""
 
 
+# compiling evaluates the bars once; what their rounding does is predicted
+mujoco.set_mju_user_warning(lambda _: None)
+
 _SITE = mujoco.mjtObj.mjOBJ_SITE.value
 
 
