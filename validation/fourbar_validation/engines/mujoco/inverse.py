@@ -3,6 +3,7 @@
 Multipliers close the loop.
 """
 
+import warnings
 from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -37,9 +38,6 @@ def find_limit_met(parts: Iterable[MovingPart]) -> str:
     return ""
 
 
-# compiling evaluates the bars once; what their rounding does is predicted
-mujoco.set_mju_user_warning(lambda _: None)
-
 _SITE = mujoco.mjtObj.mjOBJ_SITE.value
 
 
@@ -66,7 +64,10 @@ class MujocoTree(Tree):
             body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0.0, 0.0, 1.0])
             for name, place in part.points.items():
                 body.add_site(name=name, pos=[*place, 0.0])
-        self.model = model = spec.compile()
+        # the compiler evaluates the bars once, and warns of a mass matrix that the
+        # inverse dynamics never invert
+        with warnings.catch_warnings(action="ignore"):
+            self.model = model = spec.compile()
         # a centre or site nearer than 1e-6 m is taken for the body's origin, silently;
         # these marks are why
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
