@@ -83,7 +83,8 @@ def _measure_path(course: MotionCourse, name: str, circuit: int) -> Path:
         steps = steps[(steps >= 0) & (steps < len(places) - 1)]
         first = places[steps, None]
         inside = np.arange(1, PARTS) / PARTS
-        between = (first + (places[steps + 1, None] - first) * inside).ravel()
+        between = first + (places[steps + 1, None] - first) * inside
+        between = np.setdiff1d(between, places)  # a step at a limit may be a rounding
         # all stay: without the others another direction would seem narrower
         places = np.concatenate([places, between])
         points = np.concatenate([points, _locate_point(course, name, circuit, between)])

@@ -51,9 +51,8 @@ def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands
     Raises InputError for a time that the law does not have.
     """
     law: Any = scene.motion.law
-    own: Any = compute_times(scene, base)
+    own: Any = base.time if law is not None else compute_times(scene, base)
     if law is not None:
-        own = base.time
         first, *_, last = law.time
     elif own is not None:
         first, last = -math.inf, math.inf

@@ -60,7 +60,6 @@ _OF_TORQUE = (
     "t2",
     "t3",
     "t4",
-    "t12",
     "moment",
     "drehmoment",
     "antriebsmoment",
@@ -89,6 +88,7 @@ _BY_UNIT = {
     "t": {"time": "s", "torque": "N m"},
     "m": {"torque": "N m"},
     **{f"w{bar}": {f"omega_{bar}": "rad/s"} for bar in MOVING_BARS},
+    "t12": {"torque": "N m"},
 }
 """Letters, spelled as in _OTHER_NAMES, and what they mean by the unit beside them."""
 _REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
