@@ -1063,7 +1063,9 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     assert note.startswith(words)
 
 
-@pytest.mark.parametrize("heading", ["omega", "R12x [N]", "F12 / F32"])
+@pytest.mark.parametrize(
+    "heading", ["omega", "R12x [N]", "F12 / F32", "T12 [K]", "W3 [N]"]
+)
 def test_a_column_of_an_unknown_name_is_left_out_by_name(heading, torques):
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
     ((name, why),) = table.left_out.items()

@@ -11,7 +11,7 @@ import pytest
 
 from fourbar.effects import Gravity, PinFriction
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import Bar, FourBar
+from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Motion, Rise
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -50,6 +50,10 @@ SCENES = {
     "centre 100 m away": Scene(bars(*ORDINARY, r=100.0), Motion([0.63, 0.94], 10.0)),
     "ground at 1e7 rad": Scene(bars(*ORDINARY, 1e7), Motion([0.63, 1.57], 10.0)),
     "bars of micrometres": Scene(bars(*TINY), Motion(POSITIONS, 10.0)),
+    # the compiler would move what is within 1e-6 m of a pin onto it
+    "bars below a micrometre": Scene(
+        uniform(2e-7, 8e-8, 1.8e-7, 1.5e-7, per_metre=1e11), Motion(POSITIONS, 10.0)
+    ),
     "positions alone": Scene(bars(*TINY), Motion(POSITIONS)),
     "friction beside a change point": Scene(
         bars(0.18, 0.1, 0.26, 0.18),

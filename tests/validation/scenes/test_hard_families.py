@@ -343,7 +343,7 @@ def test_a_reset_and_what_caused_it_are_seen(what, monkeypatch, tmp_path):
 
 
 def test_an_alarm_fails_its_row(monkeypatch):
-    monkeypatch.setattr(simulate, "list_alarms", lambda *_: ["the sky falls"])
+    monkeypatch.setattr(simulate, "list_alarms", lambda *_: {"sky": "the sky falls"})
     simulations = [engine for engine in HARD_ENGINES if engine.through_time]
     rows = judge("scene", SWEEP, simulations).rows
     assert (FAILS, "the sky falls") in {(row.verdict, row.reason) for row in rows}

@@ -73,8 +73,10 @@ _LIMITS = {
 """Greatest allowed value of each residual, and the reason."""
 
 
-def list_alarms(evidence: dict[str, float], size: float, factor: float) -> list[str]:
-    """Say what is wrong with a run.
+def list_alarms(
+    evidence: dict[str, float], size: float, factor: float
+) -> dict[str, str]:
+    """Say what is wrong with a run, by the residual that is too large.
 
     Parameters
     ----------
@@ -84,11 +86,11 @@ def list_alarms(evidence: dict[str, float], size: float, factor: float) -> list[
         may be larger where its terms cancel.
     """
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
-    alarms = []
+    alarms = {}
     for name, (limit, reason) in _LIMITS.items():
         most = limit * factor if name in _FORCE_RESIDUALS else limit
         if name in seen and not seen[name] <= most:
-            alarms.append(f"{name} = {seen[name]:.1e} > {most:g}: {reason}")
+            alarms[name] = f"{name} = {seen[name]:.1e} > {most:g}: {reason}"
     return alarms
 
 

@@ -348,7 +348,7 @@ def split_segments(
     return [segment for segment in segments if segment]
 
 
-_MOST_UNEVEN = 20.0
+_MOST_HURRIED = 20.0
 """Greatest speed of the input over its mean: near a limit of what is commanded it grows
 without bound, and with it the steps of a window, which are those of the fastest
 throughout; here they are 40 000.
@@ -401,10 +401,10 @@ class Lead(RunCourse):
         greatest = float(np.abs(self.omega_2[positions]).max())
         if turned := self.turned(positions):
             uneven = float(np.ptp(self.times(positions))) * greatest / turned
-            if uneven > _MOST_UNEVEN:
+            if uneven > _MOST_HURRIED:
                 raise LimitError(
                     f"the input is at most {uneven:.0f} times as fast as on the mean;"
-                    f" up to {_MOST_UNEVEN:g} it is led"
+                    f" up to {_MOST_HURRIED:g} it is led"
                 )
         return greatest
 

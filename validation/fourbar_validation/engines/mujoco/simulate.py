@@ -225,11 +225,13 @@ class _Simulation:
             evidence=self.evidence,
         )
         size = sum(linkage.lengths)
-        answer.alarms += list_alarms(self.evidence, size, self._find_factor(answer))
-        uneven = find_uneven(self.scene) if self.bounded and answer.alarms else None
+        alarms = list_alarms(self.evidence, size, self._find_factor(answer))
+        first = next(iter(alarms), "")
+        uneven = find_uneven(self.scene) if self.bounded and first else None
         # no rounding keeps a crank alone from its speed
-        if uneven and not answer.alarms[0].startswith("speed_error"):
-            raise LimitError(f"{answer.alarms[0]}; {uneven}")
+        if uneven and first != "speed_error":
+            raise LimitError(f"{alarms[first]}; {uneven}")
+        answer.alarms += alarms.values()
         return answer
 
     def _find_factor(self, answer: Answer) -> float:
