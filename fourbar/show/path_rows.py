@@ -7,6 +7,7 @@ import numpy as np
 from fourbar.errors import clean_line
 from fourbar.show.driving import name_places
 from fourbar.show.duty import convert
+from fourbar.show.lines import wrap_line
 from fourbar.show.shown_units import choose_unit, drop_rounding
 from fourbar.solution import Conversion, Solution, find_unit_in
 from fourbar.studies.paths import measure_paths
@@ -15,7 +16,7 @@ _INDENT = " " * 4
 
 
 def write_paths(solution: Solution, units: Conversion) -> list[str]:
-    """Write three lines for each point: its extent, and how straight its path is."""
+    """Write lines for each point: its extent, and how straight its path is."""
     lines = []
     name, unit = name_places(solution)
     factor, place = choose_unit(1.0, unit, units)
@@ -30,9 +31,11 @@ def write_paths(solution: Solution, units: Conversion) -> list[str]:
         )
         (direction,) = drop_rounding(np.array([path.direction]), np.pi)
         first, last = (f"{factor * end + 0.0:.6g}" for end in path.ends)
+        extent = (
+            f"x from {left} to {right} {length}, y from {below} to {above} {length}"
+        )
         lines += [
-            f"path of {clean_line(point)}: x from {left} to {right} {length}, y from"
-            f" {below} to {above} {length}",
+            *wrap_line(f"path of {clean_line(point)}: {extent}"),
             f"{_INDENT}straightness {across} {length}, stroke {along} {length} along"
             f" {angle * direction:.6g} {turned},",
             f"{_INDENT}from {name} = {first} to {last} {place}",

@@ -8,6 +8,7 @@ from pytest import approx
 
 from fourbar import solve, units
 from fourbar.files import loads
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.path_rows import write_paths
 from fourbar.studies.paths import measure_paths
 
@@ -80,10 +81,13 @@ def test_a_turn_past_two_circuits_has_an_arc_in_each():
     """From A to O4 it is 210 mm to 390 mm, output less coupler to both."""
     motion = 'theta_2 = { from = "0 deg", to = "360 deg", steps = 7 }'
     text = CRANK.replace("100 mm", "350 mm").replace("250 mm", "90 mm")
-    paths = measure_paths(solve(loads(text.replace("220 mm", "300 mm") + motion)))
+    solution = solve(loads(text.replace("220 mm", "300 mm") + motion))
+    paths = measure_paths(solution)
     low, high = (acos((35**2 + 30**2 - e**2) / (2 * 35 * 30)) for e in (21, 39))
     half = 0.5 * (high - low)
     assert [*paths] == ["P", "P in the other circuit"]
+    lines = write_paths(solution, units("mm deg"))
+    assert len(lines) == 7 and max(map(len, lines)) <= BLOCK_WIDTH
     for path in paths.values():
         assert path.stroke == approx(0.16 * sin(half), abs=1e-12)
         assert path.straightness == approx(0.08 * (1.0 - cos(half)), abs=1e-12)
