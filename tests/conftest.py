@@ -9,7 +9,7 @@ import shutil
 import signal
 import sys
 
-import pytest
+from pytest import fixture, hookimpl, mark, skip
 
 # NumPy and SciPy are loaded after this. Each worker of the tests has a core of its own:
 # threads that wait for one another would take time from the other worker.
@@ -44,10 +44,10 @@ def pytest_collection_modifyitems(items):
             for name, here in HERE.items()
             if not here and item.get_closest_marker(name)
         ):
-            item.add_marker(pytest.mark.skip(reason=f"of {system} alone"))
+            item.add_marker(mark.skip(reason=f"of {system} alone"))
 
 
-@pytest.hookimpl(wrapper=True)
+@hookimpl(wrapper=True)
 def pytest_collection():
     """Modules and tests are kept to the end: looking for garbage among them takes a
     sixth of the time in which they are loaded.
@@ -59,7 +59,7 @@ def pytest_collection():
     return collected
 
 
-@pytest.fixture
+@fixture
 def interruptible():
     """Programs started here heed SIGINT.
 
@@ -70,11 +70,11 @@ def interruptible():
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.fixture(scope="session")
+@fixture(scope="session")
 def chromium(tmp_path_factory):
     """One browser for all tests of pages; each test opens its own page in it."""
     if CHROMIUM is None or DRIVER is None:
-        pytest.skip(
+        skip(
             "pages are tested in Chromium: install chromium and chromedriver"
             " (chromium-driver)"
         )
@@ -90,7 +90,7 @@ def chromium(tmp_path_factory):
     driver.quit()
 
 
-@pytest.fixture
+@fixture
 def browse(chromium, tmp_path):
     """Opens page text at a width, light or dark.
 

@@ -1,11 +1,11 @@
 """Command lines of `fourbar`, run in this process in an empty folder."""
 
-import pytest
+from pytest import fixture
 
 from fourbar import cli
 
 
-@pytest.fixture
+@fixture
 def run(capsys, tmp_path, monkeypatch):
     """Runs a command: exit status, standard output, standard error."""
     monkeypatch.chdir(tmp_path)
@@ -18,7 +18,7 @@ def run(capsys, tmp_path, monkeypatch):
     return call
 
 
-@pytest.fixture
+@fixture
 def show(run):
     """Runs a command, which must hold, and returns what it prints."""
 

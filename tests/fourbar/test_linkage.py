@@ -4,8 +4,7 @@ from dataclasses import replace
 from inspect import signature
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import Bar, InputError
 from tests.support.rows import read_rows
@@ -46,7 +45,7 @@ def test_the_signature_has_the_units():
     assert "Annotated[float, 'kg'] = 0.0" in str(signature(Bar))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, key",
     read_rows("""
 {"density": 7850} | density

@@ -6,9 +6,8 @@ By name, frozen, comparable, as a data frame with units.
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import raises
+from pytest import importorskip, mark, raises
 
 import fourbar
 from fourbar import InputError, Point, solve
@@ -60,7 +59,7 @@ def test_solutions_are_equal_bit_by_bit():
 
 
 def test_a_data_frame_names_the_unit_of_each_column():
-    pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
+    importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
     table = solve(pointed()).to_pandas()
     units = table.attrs["units"]
     assert set(units) == set(table.columns) - {"status", "branch", "drive_bar"}
@@ -74,7 +73,7 @@ def test_a_data_frame_names_the_unit_of_each_column():
     assert inches["units"]["P_x [in]"] == "in"
 
 
-@pytest.mark.parametrize("missing", [[], [0, 1], [4, 8, 12, 17, 21, 26]])
+@mark.parametrize("missing", [[], [0, 1], [4, 8, 12, 17, 21, 26]])
 def test_angles_of_several_turns_are_continuous_across_gaps(missing):
     sweep = np.array([np.linspace(-3.0, 16.0, 30), np.linspace(2.0, -14.0, 30)])
     sweep[:, missing] = np.nan

@@ -9,10 +9,9 @@ from functools import partial
 from math import isfinite, pi
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Bar,
@@ -151,7 +150,7 @@ def scenes(draw):
     return Scene(linkage, motion, draw(bars), tuple(loads), tuple(effects))
 
 
-@pytest.mark.slow
+@mark.slow
 @EXAMPLES
 @given(scenes(), st.sampled_from(STAGES))
 def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stage):
@@ -165,7 +164,7 @@ def test_where_the_status_is_ok_every_requested_quantity_is_a_number(scene, stag
     assert infinite == [], "no value is NaN, never infinite"
 
 
-@pytest.mark.parametrize("kind", ("angle", "stroke"))
+@mark.parametrize("kind", ("angle", "stroke"))
 def test_where_the_loop_does_not_close_only_what_is_commanded_has_a_value(kind):
     """Bar 2 alone, its points and the stroke of its cylinder would go on."""
     cylinder = LinearDrive(Place(1, (0.25, -1.0)), Place(2, (0.2, 0.0)))
@@ -189,9 +188,7 @@ KITE = uniform(1.0, 0.5, 0.5, 1.0)
 CRANK_ROCKER = uniform(*CRANK_ROCKER_LENGTHS)
 
 
-@pytest.mark.parametrize(
-    "linkage, branch, drive_bar", [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)]
-)
+@mark.parametrize("linkage, branch, drive_bar", [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)])
 def test_a_bar_that_does_not_turn_takes_no_torque(linkage, branch, drive_bar):
     """T3 of a parallelogram and T4 of a folded kite would have a pole at every
     position.

@@ -5,20 +5,19 @@ writing fails.
 import os
 import stat
 
-import pytest
-from pytest import raises
+from pytest import mark, raises
 
 from fourbar import InputError
 from fourbar.writing import write_bytes
 
-pytestmark = pytest.mark.posix
+pytestmark = mark.posix
 
 
 def mode(path):
     return stat.S_IMODE(path.stat().st_mode)
 
 
-@pytest.mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
+@mark.parametrize("before", [0o600, 0o640, 0o664, 0o755], ids=oct)
 def test_an_existing_file_keeps_its_mode_and_a_new_one_is_an_ordinary_file(
     tmp_path, before
 ):

@@ -3,16 +3,16 @@
 On linkages that it has never seen, against an exhaustive search.
 """
 
-import pytest
+from pytest import mark
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_lab import advice
 from fourbar_lab.cli import status as ended
 
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 
 
-@pytest.mark.parametrize("index", [9, 10])
+@mark.parametrize("index", [9, 10])
 def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
     """A linkage of the study `advice` is judged between the positions that the advice
     saw. These two ask for two digits, which a search finds in few steps.
@@ -22,7 +22,7 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
 
 
 # Wilson: n of n met are at least n/(n + 1.96^2) at 95 %
-@pytest.mark.parametrize(("count", "decided"), [(72, FAILED), (73, HOLDS)])
+@mark.parametrize(("count", "decided"), [(72, FAILED), (73, HOLDS)])
 def test_few_cases_cannot_tell_how_often_the_advice_is_met(
     count, decided, tmp_path, monkeypatch
 ):

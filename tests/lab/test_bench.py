@@ -6,8 +6,8 @@ Each is of a row that is measured, is reported with its reason, and costs the ru
 import math
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
+from pytest import mark
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
@@ -22,7 +22,7 @@ ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
     """At counts at which the times mean nothing, but everything runs."""
     monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
@@ -46,7 +46,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "scene", [crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0, 300.0]))]
 )
 def test_thirteen_equations_have_the_solution_of_the_formulas(scene):
@@ -59,9 +59,9 @@ def test_thirteen_equations_have_the_solution_of_the_formulas(scene):
     np.testing.assert_allclose(unknowns[:, -1], solution.torque, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.timeout(600)
+@mark.slow
+@mark.posix
+@mark.timeout(600)
 def test_commands_start_within_their_limits():
     """Two processes that follow one another share what else the machine does. What is
     beyond its limit after a few rounds is measured in more.
@@ -77,7 +77,7 @@ def test_commands_start_within_their_limits():
     assert not beyond
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_contender_finds_the_same_unknowns(monkeypatch):
     scene, command = make_example(), command_positions(500)
     solution = solve(scene, at=command)
@@ -96,8 +96,8 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch):
         ).all(), name
 
 
-@pytest.mark.parametrize("name", bench.SPEED_LIMITS)
-@pytest.mark.parametrize("factor", [math.nan, 1.01, 1.0])
+@mark.parametrize("name", bench.SPEED_LIMITS)
+@mark.parametrize("factor", [math.nan, 1.01, 1.0])
 def test_what_is_beyond_its_limit_fails_with_the_reason(name, factor, monkeypatch):
     rows = {what: limit.bound for what, limit in bench.SPEED_LIMITS.items()}
     rows["all, 1000 positions"] = 100.0

@@ -7,7 +7,7 @@ asked twice.
 import csv
 import json
 
-import pytest
+from pytest import fixture, importorskip, mark
 
 from fourbar_lab.benchmark import BENCHMARKED_ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
@@ -18,7 +18,7 @@ from tests.support.guests import PLAIN
 WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')
 
 
-@pytest.fixture
+@fixture
 def folder(tmp_path):
     """A stranger's folder.
 
@@ -58,7 +58,7 @@ def find_rows(table, column, **values):
     return {row[column]: row for row in table if values.items() <= row.items()}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_stranger_s_engine_has_the_letters_that_its_numbers_earn(folder):
     letters, table = run(folder, "crank_rocker", "slider_crank", "sprung")
     first = {engine: letters[engine, "crank_rocker"] for engine, _ in letters}
@@ -86,10 +86,10 @@ def test_the_engines_of_the_lab_are_entries_that_a_run_finds_too():
     assert all(reason.startswith(rows) for reason in read_reasons(BENCHMARKED_ENGINES))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("library", ["mujoco", "pinocchio"])
+@mark.slow
+@mark.parametrize("library", ["mujoco", "pinocchio"])
 def test_an_engine_answers_the_slider_cranks(library, folder):
-    pytest.importorskip(library)
+    importorskip(library)
     program = ["python", "-m", "fourbar_lab.simulators.slider_engines", library]
     (folder / "engines.toml").write_text(
         f'[[engine]]\nname = "it"\ncommand = {json.dumps(program)}\n'

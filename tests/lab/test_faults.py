@@ -5,7 +5,7 @@ The list fits the tree, and some of its faults are tried.
 
 import math
 
-import pytest
+from pytest import mark
 
 from fourbar_lab import faults
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -42,15 +42,15 @@ def test_every_entry_fits_its_module_and_says_what_catches_it():
             assert entry["caught_by"] or entry["harmless"], entry["fault"]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_faulted_module_compiles():
     for entry in read_faults():
         for name, text in inject_fault(entry).items():
             compile(text, name, "exec")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "fault",
     [
         "a load's couple bends its bar from the first pin on",
@@ -80,8 +80,8 @@ def test_tests_that_do_not_fail_or_take_long_let_a_fault_survive(monkeypatch):
         assert why is None if says is None else says in why
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
+@mark.slow
+@mark.timeout(300)
 def test_an_injected_fault_fails_the_harness_where_its_entry_says():
     """A fault of the formulas is noticed by every exact engine by itself."""
     chosen = (*IN_FORMULAS, *ELSEWHERE)
@@ -93,7 +93,7 @@ def test_an_injected_fault_fails_the_harness_where_its_entry_says():
         assert fault in ELSEWHERE or noticed >= EXACT, (fault, noticed)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("failing", "why"),
     [
         ({"crank": []}, "nothing fails"),

@@ -8,7 +8,7 @@ from importlib import import_module
 from unittest.mock import Mock
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar.files import loads
@@ -25,15 +25,15 @@ from tests.support.scenes import crank_rocker
 SEED = 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "path", sorted(COUNTEREXAMPLES.glob("*.toml")), ids=lambda path: path.stem
 )
 def test_a_kept_counterexample_holds(path):
     assert examine.list_findings(loads(path.read_text("utf-8"))) == []
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_stretch_of_scenes_holds():
     assert not [number for number in range(60) if examine.examine_scene(SEED, number)]
 

@@ -6,7 +6,7 @@ How they are made, what counts as a changed number, and what the harness catches
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar.formulas import torque
 from fourbar_lab import mutants as harness
@@ -31,7 +31,7 @@ def test_a_number_counts_as_changed_from_a_billionth_on():
         assert is_changed(before, {**before, "torque": other}) == counts
 
 
-@pytest.mark.slow
+@mark.slow
 def test_without_a_mutant_the_harness_holds():
     """Near change points too it holds.
 
@@ -41,7 +41,7 @@ def test_without_a_mutant_the_harness_holds():
         harness.make_baseline(scene)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_harness_alone_catches_a_wrong_sign(monkeypatch):
     harness.make_baseline(SCENE)
     spoil_formulas(monkeypatch, lambda right: replace(right, F14=-right.F14))

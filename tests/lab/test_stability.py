@@ -6,14 +6,14 @@ The full one is `python -m fourbar_lab stability`.
 import math
 
 import numpy as np
-import pytest
+from pytest import fixture, mark
 
 import fourbar
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.stability import judge_samples
 from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, is_by_chance
 
-pytestmark = pytest.mark.slow  # random campaigns
+pytestmark = mark.slow  # random campaigns
 SAMPLES = 10
 """Per family: half a second each; the ten thousand of each are `python -m fourbar_lab
 stability`.
@@ -89,20 +89,20 @@ def assert_bounds(tally):
     assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def tallies():
     return {family: judge_samples(family, range(SAMPLES)) for family in FAMILY_DRAWERS}
 
 
-@pytest.mark.parametrize("family", FAMILY_DRAWERS)
+@mark.parametrize("family", FAMILY_DRAWERS)
 def test_every_output_is_within_what_the_inputs_last_digits_do(family, tallies):
     tally = tallies[family]
     assert tally.samples == SAMPLES and tally.not_assembled <= SAMPLES / 10
     assert_bounds(tally)
 
 
-@pytest.mark.parametrize("bar", [3, 4])
-@pytest.mark.parametrize("family", FAMILY_DRAWERS)
+@mark.parametrize("bar", [3, 4])
+@mark.parametrize("family", FAMILY_DRAWERS)
 def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too(
     family, bar
 ):
@@ -114,7 +114,7 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
 
 # ratios: the torque of a bar that hardly turns has a pole; of torque times speed the
 # derivative by theta_2 was 1.05 of what is allowed
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("family", "samples"), [("random", range(6)), ("ratios", range(2, 3))]
 )
 def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(family, samples):
@@ -151,7 +151,7 @@ def test_a_share_is_one_that_chance_explains():
     assert is_by_chance(k - 1, 60) and not is_by_chance(k, 60)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("family", "seed", "number"),
     [(*drawn, number) for drawn, bad in ONCE_BAD.items() for number in bad],
 )
@@ -159,7 +159,7 @@ def test_samples_that_once_were_bad(family, seed, number):
     assert_bounds(judge_samples(family, range(number, number + 1), seed))
 
 
-@pytest.mark.parametrize("number", ONCE_TOO_WIDE)
+@mark.parametrize("number", ONCE_TOO_WIDE)
 def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(number):
     tally = judge_samples("change_point", range(number, number + 1))
     assert not any(tally.too_large.values())

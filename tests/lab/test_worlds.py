@@ -6,7 +6,7 @@ MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
 import math
 
 import numpy as np
-import pytest
+from pytest import importorskip, mark, raises
 
 from fourbar_lab.simulators.mujoco_c import MujocoFile
 from fourbar_lab.worlds import CONTENDERS, FORMULAS_ON_ONE_CORE, measure_worlds
@@ -57,7 +57,7 @@ def test_a_world_that_is_not_finite_fails():
     prepared.read(results)
     # not among the worlds that are judged
     results[2][0] = np.nan
-    with pytest.raises(ArithmeticError, match="diverged"):
+    with raises(ArithmeticError, match="diverged"):
         prepared.read(results)
 
 
@@ -70,10 +70,10 @@ def test_the_page_states_errors_that_hold():
     assert max(map(float, rows[warp][-3:-1])) < SINGLE_ON_A_GPU
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("name", [name for name in CONTENDERS if name != MUJOCO])
+@mark.nightly
+@mark.parametrize("name", [name for name in CONTENDERS if name != MUJOCO])
 def test_each_simulator_that_is_installed_evaluates_worlds(name):
     module = CONTENDERS[name].adapter.partition(":")[0]
-    pytest.importorskip(f"fourbar_lab.simulators.{module}", exc_type=ImportError)
+    importorskip(f"fourbar_lab.simulators.{module}", exc_type=ImportError)
     cost = measure_worlds(name, TWO_TURNS)
     check_errors(name, cost.torque, cost.force)

@@ -6,7 +6,7 @@ Planted faults of the lab try, too, that an oracle fails what errs.
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar import Bar, Flywheel, FourBar, Gravity, Load, Motion, Springs, Sweep
@@ -160,7 +160,7 @@ QUICK = {
 }
 
 
-@pytest.mark.parametrize("name", slow_but(QUICK, HARD))
+@mark.parametrize("name", slow_but(QUICK, HARD))
 def test_right_answers_hold_where_they_are_hard_to_judge(name):
     scene, oracles, compared = HARD[name]
     rows = judge_by(scene, *oracles.split())
@@ -168,7 +168,7 @@ def test_right_answers_hold_where_they_are_hard_to_judge(name):
     assert {row.quantity for row in rows if row.compared} >= {*compared.split()}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"]
 )
 def test_every_number_that_a_scene_states_is_found_in_its_file(name):

@@ -6,7 +6,7 @@
 import os
 from contextlib import suppress
 
-import pytest
+from pytest import mark
 
 from fourbar_validation.run.question import NotAskedError
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
@@ -50,7 +50,7 @@ def find_failing(rows):
     return [f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("name", "oracle"),
     slow_but([asked for asked in ASKED if asked[0] not in SLOW], ASKED),
 )
@@ -74,19 +74,19 @@ def hold(scene, oracle):
         assert not find_failing(judge_by(scene, oracle))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("number", "oracle"), share_out(len(SHIPPED), SHIPPED_SHARE))
+@mark.slow
+@mark.parametrize(("number", "oracle"), share_out(len(SHIPPED), SHIPPED_SHARE))
 def test_shipped_scenes_hold(number, oracle):
     hold(SHIPPED.scene(number), oracle)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("number", "oracle"), share_out(RANDOM_SCENES, SHARE))
+@mark.slow
+@mark.parametrize(("number", "oracle"), share_out(RANDOM_SCENES, SHARE))
 def test_random_scenes_hold(number, oracle):
     hold(draw_random_scene(SEED, number, tuple(DrawnType)), oracle)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", range(0, LAWS, LAW_SHARE))
+@mark.slow
+@mark.parametrize("number", range(0, LAWS, LAW_SHARE))
 def test_random_laws_hold(number):
     hold(draw_motion(SEED, number), "summary")

@@ -13,7 +13,7 @@ from decimal import Decimal
 from functools import partial
 
 import numpy as np
-import pytest
+from pytest import mark, raises
 
 import fourbar
 from fourbar import (
@@ -39,7 +39,7 @@ from tests.support.checkout import ROOT, read
 from tests.support.scenes import CYLINDER, crank_rocker
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     names = sorted(dir(fourbar))
     table = read("docs/api.md").partition("## Names by task")[2].partition("\n\n|")[2]
@@ -49,10 +49,10 @@ def test_the_page_of_the_api_has_every_public_name_once_and_its_reference_too():
     assert all(f"\n### {name}\n" in reference for name in names)
 
 
-@pytest.mark.parametrize("number", [0.25, np.float64(0.25)])
+@mark.parametrize("number", [0.25, np.float64(0.25)])
 def test_a_number_where_a_bar_belongs_gets_a_sentence(number):
     words = r"bars.coupler = .*0\.25.*must be a Bar, like fourbar\.Bar"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         FourBar(0.3, Bar(0.1), number, Bar(0.22))
 
 
@@ -256,7 +256,7 @@ def spoilt(value, wrong):
                 yield type(value)(*parts) if hasattr(value, "_fields") else parts
 
 
-@pytest.mark.slow
+@mark.slow
 def test_whatever_an_argument_is_the_answer_is_a_value_or_one_line(
     tmp_path, monkeypatch
 ):
@@ -317,22 +317,22 @@ def test_scenes_compare_by_value():
         assert scene != changed
 
 
-@pytest.mark.parametrize("wrong", [0, 2, -1.5, np.nan])
+@mark.parametrize("wrong", [0, 2, -1.5, np.nan])
 def test_a_command_on_no_branch_is_refused(wrong):
     scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
     command = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         at = command._replace(angle=command.theta_2[: len(row)], branch=row)
-        with pytest.raises(InputError, match=r"at\.branch = .*must be \+1"):
+        with raises(InputError, match=r"at\.branch = .*must be \+1"):
             fourbar.solve(scene, at=at)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "wrong", [{"branch": np.array(1)}, {"speed": [1.0, 2.0]}, {"acceleration": "1"}]
 )
 def test_a_command_of_another_shape_is_refused(wrong):
     scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
-    with pytest.raises(InputError, match=r"must be numbers, shape \(2,\)"):
+    with raises(InputError, match=r"must be numbers, shape \(2,\)"):
         fourbar.solve(scene, at=fourbar.command(scene)._replace(**wrong))
 
 

@@ -7,7 +7,7 @@ import re
 import runpy
 from dataclasses import replace
 
-import pytest
+from pytest import approx, mark
 
 from fourbar.files import load
 from fourbar.scene import command
@@ -62,12 +62,12 @@ def compute_row(text, steps, folder):
     return compute_errors(SCENE, trial.at, trial.quantities)
 
 
-@pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
+@mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
 def test_the_errors_of_the_table_are_computed_again(row, tmp_path):
     text, steps, torque, force, _ = row
     errors = compute_row(text, float(steps), tmp_path)
-    assert errors.torque == pytest.approx(float(torque), rel=PRINTED)
-    assert errors.force == pytest.approx(float(force), rel=PRINTED)
+    assert errors.torque == approx(float(torque), rel=PRINTED)
+    assert errors.force == approx(float(force), rel=PRINTED)
 
 
 def test_the_first_sentences_are_those_of_the_table():
@@ -89,8 +89,8 @@ def read_words(svg):
     return {text for text in texts if text.strip() and not re.search(r"\d", text)}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["hard", "effects", "small-hard", "small-effects"])
+@mark.slow
+@mark.parametrize("name", ["hard", "effects", "small-hard", "small-effects"])
 def test_the_other_pictures_are_those_that_are_drawn(name):
     with apply_style():
         drawn = write_alone(DRAWS[f"draw_{name.replace('-', '_')}"](), name)

@@ -11,7 +11,7 @@ import shlex
 
 import click
 import numpy as np
-import pytest
+from pytest import approx, fixture, mark
 
 import fourbar
 from fourbar.cli import group, status
@@ -84,7 +84,7 @@ def test_one_version_stands_everywhere():
         assert line.format(fourbar.__version__) in read(name).splitlines()
 
 
-@pytest.fixture
+@fixture
 def checkout(tmp_path, monkeypatch):
     """A folder that looks like a checkout and may be written to."""
     (tmp_path / "models").symlink_to(ROOT / "models")
@@ -104,7 +104,7 @@ def test_the_readme_goes_on_from_its_first_scene(checkout, capsys):
     assert isinstance(eval(call, {"fourbar": fourbar}), np.ndarray)
     assert load(checkout / "first.toml").linkage.lengths == (0.3, 0.1, 0.25, 0.22)
     by_pins = np.hypot((0.25, 0.0, 0.175, 0.075), (0.05, 0.1, 0.05, 0.0))
-    assert load(checkout / "second.toml").linkage.lengths == pytest.approx(by_pins)
+    assert load(checkout / "second.toml").linkage.lengths == approx(by_pins)
 
 
 def test_the_table_of_the_exercise_is_right(checkout, capsys):
@@ -116,7 +116,7 @@ def test_the_table_of_the_exercise_is_right(checkout, capsys):
         assert f"{words} numbers agree" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_engine_of_the_guide_agrees(checkout, monkeypatch):
     (program,) = blocks("python", read("docs/guide-simulator.md"))
     (checkout / "closure.py").write_text(program, "utf-8")
@@ -141,14 +141,14 @@ def test_the_scene_file_is_one(checkout):
     assert fourbar.files.loads(pins + picture).picture.scale == 0.5e-3
     lengths = text[text.index("[lengths]") : text.index("[bars.input]")]
     steel = fourbar.files.loads(lengths + material).linkage.coupler
-    assert steel.mass == pytest.approx(7850.0 * 0.02 * 0.005 * steel.length)
+    assert steel.mass == approx(7850.0 * 0.02 * 0.005 * steel.length)
     (checkout / "example.toml").write_text(text)
     scene = fourbar.load(checkout / "example.toml")
     assert set(fourbar.solve(scene).status) == {"ok"}
     assert {effect.key for effect in scene.effects} <= list_kinds().keys()
 
 
-@pytest.mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
+@mark.parametrize("page", [*PAGES, *FORMS], ids=lambda page: page.name)
 def test_every_other_command_line_is_one_that_its_program_takes(page):
     """Parse the command lines, which run for minutes or name a SCENE, in running text
     and shell blocks.
@@ -187,7 +187,7 @@ def options():
     ]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", ["commands", "checks", "results", "guide-designer", "guide-roboticist"]
 )
 def test_every_option_that_a_page_names_is_one(name):
@@ -200,7 +200,7 @@ def test_every_out_has_its_short_name():
     assert len(writing) > 12 and all("-o" in names for names in writing)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("page", "heading", "program"),
     [
         ("commands", "| command | result |", group),
@@ -219,7 +219,7 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", words).replace(" ", "-") for words in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_every_link_leads_somewhere(page):
     for target in re.findall(r"\]\(([^)\s]+)\)", read(page)):
         if target.startswith("http"):
@@ -241,7 +241,7 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site():
     assert sorted(pages) == sorted(f"{name}.md" for name in listed if name)
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
+@mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
 def test_pages_keep_to_their_length(page):
     assert len(re.findall(r"\S*[^|:\-\s]\S*", read(page))) <= 3200
 
@@ -256,7 +256,7 @@ how much a capital is broader.
 """
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_no_table_is_wider_than_the_column_of_a_page(page):
     """A cell breaks between words, so its longest word decides."""
     flags = re.MULTILINE | re.DOTALL
@@ -286,7 +286,7 @@ def test_the_reference_of_the_commands_lists_every_option():
     assert "None |" not in reference
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_architecture_names_every_layer_and_no_other():
     uses = runpy.run_path(DOCS / "architecture.py")["uses"]
     for package in ("fourbar", "fourbar_validation"):
@@ -299,8 +299,8 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn():
     assert read("docs/theory.svg") == runpy.run_path(DOCS / "theory.py")["text"]()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     ("name", "options"),
     [
         ("crank_rocker.svg", ()),
@@ -319,14 +319,12 @@ def test_the_pictures_are_those_that_are_drawn(name, options, tmp_path):
     assert words[0] == words[1]
 
 
-@pytest.mark.parametrize(
-    "path", sorted(DOCS.rglob("*.svg")), ids=lambda path: path.name
-)
+@mark.parametrize("path", sorted(DOCS.rglob("*.svg")), ids=lambda path: path.name)
 def test_every_figure_has_a_form_for_dark_pages(path):
     assert "prefers-color-scheme" in read(path)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_gallery_is_a_suite_with_pictures_and_sources():
     suite = read_suite(GALLERY / "suite.txt")
     names = [suite.name(index) for index in range(8)]
@@ -345,7 +343,7 @@ def shown(name):
 
 def test_the_pump_jack_has_a_stroke_of_54_inches():
     swing = fourbar.swing(shown("pump_jack").linkage)
-    assert swing * 72.0 == pytest.approx(54.0, rel=0.03)
+    assert swing * 72.0 == approx(54.0, rel=0.03)
 
 
 def test_the_cylinder_of_the_bucket_has_the_stroke_of_its_source():
@@ -361,19 +359,19 @@ def test_the_tailgate_has_one_unstable_equilibrium_that_is_held():
 
 def test_the_wiper_goes_60_degrees_to_and_fro_in_the_same_time():
     wiper = shown("wiper").linkage
-    assert math.degrees(fourbar.swing(wiper)) == pytest.approx(60.0, rel=1e-8)
-    assert fourbar.time_ratio(wiper) == pytest.approx(1.0, rel=1e-8)
+    assert math.degrees(fourbar.swing(wiper)) == approx(60.0, rel=1e-8)
+    assert fourbar.time_ratio(wiper) == approx(1.0, rel=1e-8)
 
 
 def test_the_landing_gear_ends_plumb_under_O4():
     first, *_, last = fourbar.solve(shown("landing_gear")).points["foot"]
-    assert first == pytest.approx([-0.250962, -0.162331], abs=2e-5)  # D of the source
-    assert last == pytest.approx([0.654038, -1.067331], abs=3e-4)
+    assert first == approx([-0.250962, -0.162331], abs=2e-5)  # D of the source
+    assert last == approx([0.654038, -1.067331], abs=3e-4)
 
 
 def test_the_second_crank_of_the_pump_goes_240_to_375_times_a_minute():
     speed = fourbar.solve(shown("double_crank_pump")).omega_4 / math.tau * 60.0
-    assert (speed.min(), speed.max()) == pytest.approx((240.0, 375.0), rel=1e-3)
+    assert (speed.min(), speed.max()) == approx((240.0, 375.0), rel=1e-3)
 
 
 def test_hoecken_s_curve_is_straight_to_1_5_mm_over_440():

@@ -9,7 +9,7 @@ import shutil
 import sys
 import textwrap
 
-import pytest
+from pytest import fixture, mark, raises
 
 from fourbar import effects
 from fourbar.effects import Load
@@ -53,7 +53,7 @@ def block(language, page=PAGE, number=0):
     return re.findall(rf"```{language}\n(.*?)```", page, re.S)[number]
 
 
-@pytest.fixture
+@fixture
 def latch(monkeypatch, tmp_path):
     """The effect of the page, from its one file in the folder of effects."""
     (tmp_path / "latch.py").write_text(block("python"), "utf-8")
@@ -85,7 +85,7 @@ def test_the_example_is_read_written_and_agreed_on(latch):
     assert latch.example in block("toml")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("engines", "missing", "refusing"),
     [
         (EXACT, (), set()),
@@ -107,7 +107,7 @@ def test_engines_without_a_model_refuse_the_example(
 
 
 def test_mjcf_has_no_counterpart_of_the_example(latch):
-    with pytest.raises(LimitError, match="'latch'"):
+    with raises(LimitError, match="'latch'"):
         write_mjcf(guide_scene())
 
 
@@ -118,7 +118,7 @@ def test_without_its_size_nothing_is_judged_by_another_scale(latch, monkeypatch)
     assert engines >= {engine.name for engine in EXACT}
 
 
-@pytest.mark.parametrize("key", effects.list_kinds())
+@mark.parametrize("key", effects.list_kinds())
 def test_the_example_of_each_effect_is_read_and_written_back(key):
     example = effects.list_kinds()[key].example
     scene = loads(f"{SCENE}[effects]\n{example}")
@@ -150,7 +150,7 @@ def test_the_scene_of_the_reference_names_everything_and_is_agreed_on():
     assert outcome(scene, EXACT)[0] == []
 
 
-@pytest.mark.parametrize("page", ["architecture", "extending"])
+@mark.parametrize("page", ["architecture", "extending"])
 def test_each_file_and_each_name_in_one_is_where_the_page_says(page):
     text = read(f"docs/{page}.md")
     stated = re.findall(r"`(\w+(?:/[\w.-]+)*/[\w-]+\.\w+)`", text)
@@ -191,7 +191,7 @@ for row in rows:
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_example_of_a_quantity_is_judged_by_every_exact_engine(tmp_path):
     """The lines of the page stand in a copy of both packages, and nothing else."""
     for package in (ROOT / "fourbar", ROOT / "validation" / "fourbar_validation"):

@@ -14,13 +14,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar.errors import INTERRUPTED
 from tests.support.checkout import BUSY, ROOT, run_python, wait_until
 from tests.support.guests import list_processes
 
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 PATIENCE = 8.0 * BUSY
 """Seconds after which nothing may be left, as SECURITY.md promises."""
 ENDLESS_MJCF = """<mujoco><worldbody><replicate count="20000" offset="0.1 0 0">
@@ -44,7 +44,7 @@ KILLS = int(os.environ.get("KILLS", "1"))
 """Moments of a start at which it is interrupted; every night there are fifty."""
 
 
-def start(what, folder, mark):
+def start(what, folder, sign):
     """Start a command that would take minutes, with a mark in its environment."""
     harness = [sys.executable, "-m", "validation"]
     if what == "loops":
@@ -64,35 +64,35 @@ def start(what, folder, mark):
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
-        env={**os.environ, "MARK_OF_A_TEST": mark},
+        env={**os.environ, "MARK_OF_A_TEST": sign},
         start_new_session=True,
     )
 
 
-def has_process(word, mark):
+def has_process(word, sign):
     """Tell whether a process runs that has the word in its command line."""
-    processes = list_processes(mark)
+    processes = list_processes(sign)
     lines = [Path(f"/proc/{process}/cmdline").read_bytes() for process in processes]
     # the harness's own line names the guest too
     return any(word in line and b"validation" not in line for line in lines)
 
 
 @contextmanager
-def leaving_nothing(mark):
+def leaving_nothing(sign):
     """Hold that soon after the body no process has the mark."""
     try:
         yield
-        wait_until(lambda: not list_processes(mark), PATIENCE)
+        wait_until(lambda: not list_processes(sign), PATIENCE)
     finally:
-        for left in list_processes(mark):
+        for left in list_processes(sign):
             os.kill(left, signal.SIGKILL)
 
 
-@pytest.mark.linux
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.timeout(120 + 10 * KILLS)
-@pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("what", ["loops", "guest"])
+@mark.linux
+@mark.usefixtures("interruptible")
+@mark.timeout(120 + 10 * KILLS)
+@mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@mark.parametrize("what", ["loops", "guest"])
 def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
     """A terminal sends SIGINT to all processes of the command, while workers start."""
     by_terminal = ended_by == signal.SIGINT
@@ -100,11 +100,11 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
     if by_terminal:
         moments = START_SECONDS * (np.arange(KILLS) + 0.5) / KILLS
     for moment in moments:
-        mark = f"{tmp_path}/{what}/{moment}"
-        process = start(what, tmp_path, mark)
-        with leaving_nothing(mark):
+        sign = f"{tmp_path}/{what}/{moment}"
+        process = start(what, tmp_path, sign)
+        with leaving_nothing(sign):
             started = STARTING if by_terminal or what == "loops" else b"busy.py"
-            wait_until(partial(has_process, started, mark), 30.0 * BUSY)
+            wait_until(partial(has_process, started, sign), 30.0 * BUSY)
             time.sleep(moment)
             (os.killpg if by_terminal else os.kill)(process.pid, ended_by)
             _, errors = process.communicate(timeout=PATIENCE)
@@ -114,8 +114,8 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
             assert process.returncode == INTERRUPTED
 
 
-@pytest.mark.posix
-@pytest.mark.parametrize(
+@mark.posix
+@mark.parametrize(
     ("program", "status"),
     [
         ("bound_processor_time(0.1)\nwhile True: pass", -signal.SIGXCPU),

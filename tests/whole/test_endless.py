@@ -7,7 +7,7 @@ import os
 import subprocess
 from pathlib import Path
 
-import pytest
+from pytest import mark, raises
 
 import fourbar.cli
 import fourbar_validation.cli
@@ -36,10 +36,10 @@ READING = [
 ]
 
 
-@pytest.mark.posix
-@pytest.mark.timeout(30)
-@pytest.mark.parametrize("what", ["pipe", "device", "directory"])
-@pytest.mark.parametrize("line", READING, ids=lambda line: line[:18])
+@mark.posix
+@mark.timeout(30)
+@mark.parametrize("what", ["pipe", "device", "directory"])
+@mark.parametrize("line", READING, ids=lambda line: line[:18])
 def test_what_may_never_end_is_not_waited_for(line, what, tmp_path, capsys):
     endless = Path("/dev/zero") if what == "device" else tmp_path / what
     os.mkfifo(tmp_path / "pipe")
@@ -74,7 +74,7 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_free_motion_without_end_is_given_up_with_its_reason(
     tmp_path, monkeypatch, capsys
 ):
@@ -93,5 +93,5 @@ def test_a_free_motion_too_long_for_the_engines_is_refused_before_a_run(tmp_path
     file = tmp_path / "released.toml"
     file.write_text(RELEASED)
     words = r"motion\.free\.duration = .*must not exceed 100 s in a run"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         read_scene_files([file])

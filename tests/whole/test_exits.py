@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-import pytest
+from pytest import mark, param
 
 import fourbar
 import fourbar.cli
@@ -66,7 +66,7 @@ def leaving():
         raise SystemExit(1) from None
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "command",
     [
         "check {0} {1} --json {1}",
@@ -119,8 +119,8 @@ ENDS = {
 """Commands by the status that they end with."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     ("group", "status"),
     [(group, status) for status, groups in ENDS.items() for group in groups],
 )
@@ -137,14 +137,14 @@ def test_every_end_has_its_status(group, status, monkeypatch, capsys):
     assert bool(printed) == said
 
 
-@pytest.mark.parametrize("module", ["fourbar", "validation"])
+@mark.parametrize("module", ["fourbar", "validation"])
 def test_an_interruption_while_the_libraries_are_imported_is_one_line(module, tmp_path):
     (tmp_path / "numpy.py").write_text("raise KeyboardInterrupt")
     done = run_python("-m", module, "--help", PYTHONPATH=join_paths(tmp_path))
     assert (done.returncode, done.stderr) == (INTERRUPTED, "error: interrupted\n")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_program_without_output_streams_runs(monkeypatch):
     """One started with `>&- 2>&-`, or on Windows without a console."""
     for stream in ("stdout", "stderr"):
@@ -161,7 +161,7 @@ FOURBAR, LAB = fourbar.cli.status, fourbar_lab.cli.status
 VALIDATION = fourbar_validation.cli.status
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("figures", "words"),
     [
         (
@@ -224,8 +224,8 @@ PROCESSES = [
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     ("program", "line", "status"),
     PROCESSES,
     ids=[f"{program} {Path(line).name}" for program, line, _ in PROCESSES],
@@ -241,7 +241,7 @@ def test_each_command_in_a_process_of_its_own(program, line, status, tmp_path):
     assert bool(complained.strip()) == (status == BAD_INPUT), complained
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "group",
     [fourbar_validation.cli.group, fourbar_lab.cli.group],
     ids=lambda group: group.callback.__module__,
@@ -259,8 +259,8 @@ def test_the_help_of_the_harness_imports_no_engine():
     assert run_python("-c", code).returncode == HOLDS
 
 
-@pytest.mark.slow
-@pytest.mark.linux  # which alone has a device that is always full
+@mark.slow
+@mark.linux  # which alone has a device that is always full
 def test_what_was_printed_without_being_written_out_is_not_lost_in_silence():
     code = "import click, sys; from fourbar.errors import run; "
     code += "go = click.command(name='go')(lambda: print('printed')); "
@@ -293,15 +293,15 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("header", "row"),
     [
-        pytest.param("theta_2,torque," + "x" * 20_000, "1,2,3", id="a long heading"),
-        pytest.param(
+        param("theta_2,torque," + "x" * 20_000, "1,2,3", id="a long heading"),
+        param(
             "theta_2,torque" + ",unknown" * 20_000,
             "1,2" + ",3" * 20_000,
             id="many headings",
-            marks=pytest.mark.slow,
+            marks=mark.slow,
         ),
     ],
 )
@@ -319,8 +319,8 @@ def test_no_line_is_longer_than_a_screen_can_show(header, row, tmp_path, capsys)
     assert len(printed.out) < 4 * LONGEST_MESSAGE
 
 
-@pytest.mark.slow
-@pytest.mark.posix
+@mark.slow
+@mark.posix
 def test_a_closed_standard_input_is_one_line():
     done = run_line(f"{sys.executable} -m fourbar analyze - <&-", shell=True)
     assert (done.returncode, done.stdout) == (BAD_INPUT, "")

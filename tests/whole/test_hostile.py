@@ -12,7 +12,7 @@ from unittest.mock import Mock
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import pytest
+from pytest import mark, raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, InputError
@@ -74,7 +74,7 @@ class Named(Few):
         return crank_rocker(title=text, source=text, motion=motion)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_reports_hold_hostile_text_as_text(tmp_path, monkeypatch, capsys):
     judge_here(monkeypatch)
     out = tmp_path / "deep" / "out"
@@ -92,7 +92,7 @@ def test_reports_hold_hostile_text_as_text(tmp_path, monkeypatch, capsys):
     assert folders == {"deep", "out"}  # nothing was written outside of them
 
 
-@pytest.mark.parametrize("title", [*HOSTILE.values(), "\ud800", "é" * 10_000, ""])
+@mark.parametrize("title", [*HOSTILE.values(), "\ud800", "é" * 10_000, ""])
 def test_model_files_hold_a_hostile_title_as_a_text(title):
     scene = crank_rocker(title=title)
     mjcf = ET.fromstring(write_mjcf(scene))
@@ -105,7 +105,7 @@ def test_model_files_hold_a_hostile_title_as_a_text(title):
     assert mjcf.tag == "mujoco" and not [*mjcf.iter("script"), *sdf.iter("script")]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_differences_hold_hostile_names_as_text(tmp_path, capsys):
     # a table written by somebody else, whose names nothing has looked at
     for folder, cells in (
@@ -132,7 +132,7 @@ def test_differences_hold_hostile_names_as_text(tmp_path, capsys):
     assert not ACTIVE.search(texts["html"]) and "<script>" not in texts["markdown"]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text",
     [
         "scene\n",
@@ -158,8 +158,8 @@ def test_what_is_no_table_of_results_is_one_line(text, tmp_path, capsys):
         read_complaint(capsys)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     ("rows", "reason", "words"),
     [
         (MOST_ROWS_COMPARED + 1, "", f"has {MOST_ROWS_COMPARED + 1} rows"),
@@ -189,7 +189,7 @@ def test_a_small_parquet_of_very_much_is_one_line(
     assert words in read_complaint(capsys)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", ["../out", "/tmp/out", "a/b", "..", ".", "", "a\x00b", "a\x1b[0m"]
 )
 def test_a_baseline_has_a_name_and_no_path(name, capsys):
@@ -198,9 +198,7 @@ def test_a_baseline_has_a_name_and_no_path(name, capsys):
     assert "--as" in printed and not STEERING.search(printed)
 
 
-@pytest.mark.parametrize(
-    "name", ["\x1b[31mred.toml", "a\nb.toml", "<b>.toml", "[red]x.toml"]
-)
+@mark.parametrize("name", ["\x1b[31mred.toml", "a\nb.toml", "<b>.toml", "[red]x.toml"])
 def test_a_hostile_name_of_a_bad_file_is_shown_and_not_sent(name, tmp_path, capsys):
     (tmp_path / name).write_text('title = "no lengths"')
     line = ["run", str(tmp_path / name), "--out", str(tmp_path / "out")]
@@ -216,9 +214,7 @@ def listed(tmp_path, text):
     return path
 
 
-@pytest.mark.parametrize(
-    "text", ["a.toml  # the first\n\n# none\nb.toml\n", "*.toml\n"]
-)
+@mark.parametrize("text", ["a.toml  # the first\n\n# none\nb.toml\n", "*.toml\n"])
 def test_a_suite_file_lists_scenes_from_its_own_folder(text, tmp_path):
     suite = read_suite(listed(tmp_path, text))
     assert [suite.name(i) for i in range(len(suite))] == ["a", "b"]
@@ -227,7 +223,7 @@ def test_a_suite_file_lists_scenes_from_its_own_folder(text, tmp_path):
 OUTSIDE = ("../a.toml", "/etc/passwd", "../*.toml", "a\0.toml")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("text", "words"),
     [
         *((path, "must lie in the folder") for path in OUTSIDE),
@@ -240,7 +236,7 @@ OUTSIDE = ("../a.toml", "/etc/passwd", "../*.toml", "a\0.toml")
     ids=lambda value: str(value)[:15],
 )
 def test_a_bad_suite_file_is_one_line(text, words, tmp_path):
-    with pytest.raises(InputError) as caught:
+    with raises(InputError) as caught:
         read_suite(listed(tmp_path, text))
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
@@ -255,7 +251,7 @@ class Greedy(Declines):
             bytearray(2 * WORKER_MEMORY)
 
 
-@pytest.mark.linux
+@mark.linux
 def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch):
     refuse = Mock(side_effect=ValueError("current limit exceeds maximum limit"))
     monkeypatch.setattr("resource.prlimit", refuse)
@@ -263,8 +259,8 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch):
     refuse.assert_called()
 
 
-@pytest.mark.slow
-@pytest.mark.linux
+@mark.slow
+@mark.linux
 def test_running_out_of_memory_costs_its_own_row(tmp_path, monkeypatch):
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):

@@ -6,7 +6,7 @@ from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
 
-import pytest
+from pytest import mark
 
 from tests.support.checkout import ROOT, read, run_python
 
@@ -145,8 +145,8 @@ def modules(package):
     }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("package", LAYERS)
+@mark.slow
+@mark.parametrize("package", LAYERS)
 def test_layers_stand_on_floors(package):
     floors = [floor.split() for floor in LAYERS[package]]
     height = {name: number for number, floor in enumerate(floors) for name in floor}
@@ -163,8 +163,8 @@ def test_layers_stand_on_floors(package):
                 )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("package", PACKAGES)
+@mark.slow
+@mark.parametrize("package", PACKAGES)
 def test_no_modules_import_each_other_in_a_circle_types_included(package):
     names = modules(package)
     uses = {
@@ -174,7 +174,7 @@ def test_no_modules_import_each_other_in_a_circle_types_included(package):
     TopologicalSorter(uses).prepare()  # raises where there is one
 
 
-@pytest.mark.slow
+@mark.slow
 def test_no_class_name_stands_for_two_things():
     names = Counter(
         node.name
@@ -186,7 +186,7 @@ def test_no_class_name_stands_for_two_things():
     assert not [name for name, count in names.items() if count > 1]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_picture_of_the_layers_is_what_the_imports_make():
     drawn = runpy.run_path(ROOT / "docs/architecture.py")["text"]()
     assert read("docs/architecture.svg") == drawn, "python docs/architecture.py"

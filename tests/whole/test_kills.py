@@ -15,7 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
+from pytest import fixture, mark, raises
 
 from fourbar.errors import BROKEN, HOLDS, INTERRUPTED, InputError
 from fourbar_validation.cli import status
@@ -76,8 +76,8 @@ def judge_all(suite, out, engines=EXACT, workers=2):
     return list(read_columns(out / "results.csv"))
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)  # every new worker imports the harness again
+@mark.slow
+@mark.timeout(300)  # every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
         monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
@@ -93,7 +93,7 @@ def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatc
     assert {row.scene for row in rows if row.engine == "free-body"} == {*"abcd"}
 
 
-@pytest.fixture
+@fixture
 def give_lives(tmp_path, monkeypatch):
     """Gives so many lives, each of which costs a worker its own."""
 
@@ -107,9 +107,9 @@ def give_lives(tmp_path, monkeypatch):
     return give
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
+@mark.slow
+@mark.posix
+@mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
 def test_a_worker_killed_once_is_not_held_against_the_engine(
     tmp_path, give_lives, kills, blamed
 ):
@@ -122,21 +122,21 @@ def test_a_worker_killed_once_is_not_held_against_the_engine(
     assert not any(lives.iterdir())
 
 
-@pytest.mark.slow
+@mark.slow
 def test_workers_that_die_with_nothing_to_do_end_the_run_which_can_be_resumed(
     tmp_path, monkeypatch, give_lives
 ):
     give_lives(1)
     with monkeypatch.context() as dying:
         dying.setattr(workers, "prepare_worker", dies_at_first)
-        with pytest.raises(workers.NoWorkersError, match="what is finished is kept"):
+        with raises(workers.NoWorkersError, match="what is finished is kept"):
             judge_all(Few(), tmp_path / "run", workers=1)
     assert not (tmp_path / "run" / "results.csv").exists()
     rows = judge_all(Few(), tmp_path / "run", workers=1)
     assert rows and FAILS not in {row.verdict for row in rows}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_clock_that_jumps_forward_ends_nothing(tmp_path, monkeypatch):
     """As that of a machine does which slept while an item was worked at."""
     starts = tmp_path / "starts"
@@ -211,8 +211,8 @@ def runs(pid, word):
 class Disturbed:
     """A run with a guest in one folder, started again and again."""
 
-    def __init__(self, out, guest, mark):
-        self.out, self.guest, self.mark = out, guest, mark
+    def __init__(self, out, guest, sign):
+        self.out, self.guest, self.sign = out, guest, sign
         self.rng = np.random.default_rng(SEED)
 
     @property
@@ -248,7 +248,7 @@ class Disturbed:
         if victim == "run":
             return [process.pid]
         if victim == "guest":
-            return [pid for pid in list_processes(self.mark) if runs(pid, b"plain.py")]
+            return [pid for pid in list_processes(self.sign) if runs(pid, b"plain.py")]
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
         # those that judge: no zombie, nor Python's tracker of resources
         return [pid for pid in map(int, children.split()) if runs(pid, b"spawn_main")]
@@ -261,10 +261,10 @@ class Disturbed:
             part.unlink()
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.usefixtures("interruptible")
-@pytest.mark.timeout(200 + 120 * KILLS)
+@mark.slow
+@mark.posix
+@mark.usefixtures("interruptible")
+@mark.timeout(200 + 120 * KILLS)
 def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
     tmp_path, monkeypatch
 ):
@@ -275,9 +275,9 @@ def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
     judge_here(monkeypatch)
     assert status(words_of(expected, guest)) == HOLDS
     end_guests()
-    out, mark = tmp_path / "out", f"MARK_OF_TEST={tmp_path}"
+    out, sign = tmp_path / "out", f"MARK_OF_TEST={tmp_path}"
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
-    run = Disturbed(out, guest, mark)
+    run = Disturbed(out, guest, sign)
 
     process = run.start()
     os.kill(process.pid, signal.SIGINT)
@@ -309,10 +309,10 @@ def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
     tables = ("results.csv", "results.parquet")
     assert filecmp.cmpfiles(out, expected, tables, shallow=False)[0] == [*tables]
     assert sorted(os.listdir(out)) == sorted(os.listdir(expected))
-    wait_until(lambda: not (VICTIMS[1:] and list_processes(mark)), 30.0)
+    wait_until(lambda: not (VICTIMS[1:] and list_processes(sign)), 30.0)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("motion", "key"),
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
@@ -334,7 +334,7 @@ def test_a_scene_of_too_many_positions_is_refused_before_anything_runs(
     most = MOST_POSITIONS_OF_A_SCENE
     path.write_text(f"{LENGTHS}[motion]\n{motion % most}\n")
     words = rf"{key}.steps = {most}: must be below {most} in a run"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         read_scene_files([path])
 
 
@@ -359,7 +359,7 @@ class Blunders:
         )
 
 
-@pytest.mark.slow
+@mark.slow
 def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
     tmp_path, monkeypatch
 ):

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar.edit.session import Session
@@ -19,7 +19,7 @@ from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_r
 from tests.support.checkout import ROOT
 from tests.support.runs import HERE, read_run, save_run
 
-pytestmark = [pytest.mark.slow, pytest.mark.posix]
+pytestmark = [mark.slow, mark.posix]
 DRAFT = ".*.part"
 """Hidden files that a killed process may leave: nothing reads them."""
 DIED = 77

@@ -8,7 +8,7 @@ every numerical test file, and the whole `validation run`.
 
 import os
 
-import pytest
+from pytest import mark, skip
 
 from tests.support.another_machine import BEFORE, CORES, environment, machine, why_not
 from tests.support.checkout import ROOT, run_python
@@ -29,14 +29,14 @@ NUMERICAL = [
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(3600 if ALL else 600)
-@pytest.mark.parametrize("core", CORES if ALL else ["another"])
+@mark.slow
+@mark.timeout(3600 if ALL else 600)
+@mark.parametrize("core", CORES if ALL else ["another"])
 def test_the_numbers_hold_on_another_machine(core, tmp_path):
     reasons = {name: why_not(name) for name in ([core] if ALL else CORES)}
     possible = [name for name, reason in reasons.items() if reason is None]
     if not possible:
-        pytest.skip(
+        skip(
             "not run: "
             + "; ".join(f"{name}: {reason}" for name, reason in reasons.items())
         )

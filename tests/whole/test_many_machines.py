@@ -14,7 +14,7 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
+from pytest import MonkeyPatch, fixture, mark
 
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status
@@ -29,14 +29,14 @@ PROGRAM = Path(sys.executable).with_name("fourbar-validation")
 TIME = 240.0
 """s; what takes longer has failed."""
 
-pytestmark = [pytest.mark.slow, pytest.mark.posix, pytest.mark.timeout(600)]
+pytestmark = [mark.slow, mark.posix, mark.timeout(600)]
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def alone(tmp_path_factory):
     """The folder of the same run on one machine."""
     out = tmp_path_factory.mktemp("alone")
-    with pytest.MonkeyPatch.context() as monkeypatch:
+    with MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         assert status(["run", *OPTIONS, "--out", str(out)]) == HOLDS
     return out
@@ -103,7 +103,7 @@ def has_address(scheduler):
     return scheduler.exists() and scheduler.read_text().rstrip().endswith("}")
 
 
-@pytest.mark.skipif(
+@mark.skipif(
     importlib.util.find_spec("distributed") is None,
     reason="not run: distributed is not installed: pip install distributed",
 )

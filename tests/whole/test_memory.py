@@ -3,7 +3,7 @@
 import re
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar.errors import HOLDS
@@ -34,8 +34,8 @@ memory of the process that started it in it.
 """
 
 
-@pytest.mark.slow
-@pytest.mark.linux
+@mark.slow
+@mark.linux
 def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     scene = tmp_path / "million.toml"
     text = read("models/crank_rocker.toml")
@@ -49,7 +49,7 @@ def test_analyze_of_a_million_positions_needs_little_beyond_them(tmp_path):
     assert float(seconds) < BUSY * MOST_TIME
 
 
-@pytest.mark.parametrize("name", ["crank_rocker", "capabilities/springs"])
+@mark.parametrize("name", ["crank_rocker", "capabilities/springs"])
 def test_bending_is_the_same_in_blocks(name, monkeypatch):
     scene = fourbar.load(ROOT / f"models/{name}.toml")
     solution = solve(scene, at=command(scene))

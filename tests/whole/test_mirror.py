@@ -6,7 +6,7 @@ Tests/ mirrors the tree, and what has no test of its name stands below.
 module alone, `support/` holds what tests share.
 """
 
-import pytest
+from pytest import mark
 
 from tests.support.checkout import ROOT
 from tests.support.rows import read_rows
@@ -121,7 +121,7 @@ def own_test(path, top):
     )
 
 
-@pytest.mark.parametrize("top", SOURCES)
+@mark.parametrize("top", SOURCES)
 def test_every_module_has_a_test_or_is_listed(top):
     paths = list(SOURCES[top].rglob("[!_]*.py"))
     assert paths
@@ -137,7 +137,7 @@ def test_the_tests_of_the_table_are_there():
     assert all((ROOT / "tests" / test).is_file() for test, _ in JUDGED_BY)
 
 
-@pytest.mark.parametrize("top", SOURCES)
+@mark.parametrize("top", SOURCES)
 def test_every_test_has_the_name_of_a_module_or_folder(top):
     for test in (ROOT / "tests" / top).rglob("test_*.py"):
         folder = SOURCES[top] / test.parent.relative_to(ROOT / "tests" / top)

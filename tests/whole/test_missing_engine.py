@@ -5,11 +5,11 @@ What is left is judged, and what is missing is named.
 
 import csv
 
-import pytest
+from pytest import mark
 
 from tests.support.checkout import join_paths, run_python
 
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 BLOCKER = """
 import os
 import sys
@@ -61,7 +61,7 @@ def without(library, folder, *arguments, **settings):
     )
 
 
-@pytest.mark.parametrize("library", ENGINES)
+@mark.parametrize("library", ENGINES)
 def test_the_others_run_and_the_missing_named_with_the_reason(library, tmp_path):
     done = without(library, tmp_path)
     reason = f'{library} is not installed: pip install ".[validation]" in the checkout'

@@ -4,7 +4,7 @@ import re
 import sys
 from pathlib import Path
 
-import pytest
+from pytest import mark
 
 import fourbar.cli
 import fourbar_validation.cli
@@ -64,8 +64,8 @@ def show(line, width, monkeypatch, capsys):
     return STYLE.sub("", printed.out).splitlines()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line", [*SAME, *OTHER], ids=lambda line: Path(line).name)
+@mark.slow
+@mark.parametrize("line", [*SAME, *OTHER], ids=lambda line: Path(line).name)
 def test_tables_fit_a_narrow_terminal(line, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     judge_here(monkeypatch)

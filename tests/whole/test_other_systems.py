@@ -7,7 +7,7 @@ without saying its encoding makes Python warn.
 
 from dataclasses import replace
 
-import pytest
+from pytest import fixture, mark
 
 import fourbar
 from fourbar.cli import status
@@ -16,7 +16,7 @@ from fourbar.files import save
 from fourbar_validation.cli import status as harness
 from tests.support.checkout import ROOT, join_paths, run_python
 
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 HOSTILE = {
     "LC_ALL": "C",
     "PYTHONUTF8": "0",
@@ -30,7 +30,7 @@ BEGIN = (
 )
 
 
-@pytest.fixture
+@fixture
 def folder(tmp_path):
     """A folder whose name takes more than ASCII, with a scene whose title does."""
     scene_folder = tmp_path / "Análisis de θ"
@@ -42,7 +42,7 @@ def folder(tmp_path):
     return scene_folder
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("module", "line"),
     [
         ("fourbar.cli", "analyze scène.toml --csv -o table.csv"),

@@ -19,7 +19,7 @@ import tomllib
 import zipfile
 from itertools import chain
 
-import pytest
+from pytest import mark
 
 from fourbar import Free, Motion
 from fourbar.cli import status
@@ -51,7 +51,7 @@ def libraries(requirements):
     return {MODULE_OF.get(name, name) for name in names}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("package", "folder"),
     [
         ("fourbar", "fourbar"),
@@ -83,7 +83,7 @@ def test_the_source_archive_has_the_package_that_lies_elsewhere():
         assert f"include {module}\n" in read("MANIFEST.in")
 
 
-@pytest.mark.parametrize("line", ["write", "problems"])
+@mark.parametrize("line", ["write", "problems"])
 def test_what_needs_a_checkout_says_so_in_one_line(line, monkeypatch, capsys):
     monkeypatch.setattr("fourbar_validation.places.CHECKOUT", None)
     assert lab([line]) == BAD_INPUT
@@ -132,7 +132,7 @@ def test_every_library_that_fourbar_imports_is_declared():
         assert roots <= {"fourbar", *sys.stdlib_module_names, *declared}, path
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("library", "extra", "command"),
     [
         ("matplotlib", "plot", "plot scene.toml -o a.svg"),
@@ -202,11 +202,11 @@ def installed_works(python, package, folder, constraints):
     assert missing.count("\n") == 1 and 'pip install "matplotlib>=' in missing
 
 
-@pytest.mark.skipif(
+@mark.skipif(
     os.environ.get("PACKAGE") != "all",
     reason="PACKAGE=all builds and installs wheel and archive",
 )
-@pytest.mark.timeout(1800)
+@mark.timeout(1800)
 def test_wheel_and_archive_install_on_every_python(tmp_path):
     wheel, archive = built(tmp_path)
     sizes = {one.filename: one.file_size for one in zipfile.ZipFile(wheel).infolist()}

@@ -7,7 +7,7 @@ import ast
 import re
 import time
 
-import pytest
+from pytest import mark
 
 from tests.whole.test_imports import PACKAGES, ROOT, parse
 
@@ -98,8 +98,8 @@ def measure_slowest(pattern):
     return slowest
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
+@mark.slow
+@mark.timeout(300)
 def test_a_hostile_repeat_is_refused_at_once():
     patterns = dict(list_patterns())
     assert len(patterns) > 30
@@ -112,6 +112,6 @@ def test_a_hostile_repeat_is_refused_at_once():
     assert not slow
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_pattern_with_two_readings_is_caught():
     assert measure_slowest(re.compile("(?:[a-z]+)+")) > SECONDS

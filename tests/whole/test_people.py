@@ -8,7 +8,7 @@ printed in the source of the task.
 import re
 
 import numpy as np
-import pytest
+from pytest import approx, fixture, mark
 
 import fourbar
 from fourbar.cli import status
@@ -20,7 +20,7 @@ PRINTED = 1e-5
 """Relative: a value of six or seven digits against one that is printed with six."""
 
 
-@pytest.fixture
+@fixture
 def ask(tmp_path, capsys, monkeypatch):
     """Run one command line of `fourbar` in an empty folder.
 
@@ -38,7 +38,7 @@ def ask(tmp_path, capsys, monkeypatch):
     return run
 
 
-@pytest.fixture
+@fixture
 def analyze(ask, tmp_path):
     """Return what `analyze` prints of a text, as of a file."""
 
@@ -115,7 +115,7 @@ def test_pliers_have_their_force_ratio_over_a_sweep(analyze):
     swept = PLIERS.replace('theta_2 = "49 deg"', sweep)
     names = "theta_2,F_jaw/F_handle,v_handle/v_jaw"
     rows = list_columns(analyze(swept, "--columns", names))
-    assert rows[0][1] == pytest.approx(31.969, rel=PRINTED)
+    assert rows[0][1] == approx(31.969, rel=PRINTED)
     assert all(forces == speeds for _, forces, speeds in rows)
 
 
@@ -127,12 +127,8 @@ def test_four_pins_and_the_speed_of_the_output_as_they_are_drawn(ask, tmp_path):
     stated = 'theta_4 = "drawn"\nomega_4 = "2 rad/s"'
     (tmp_path / "pins.toml").write_text(text.replace('omega_2 = "60 rpm"', stated))
     text = ask("analyze", "pins.toml")
-    assert row_of(text, "bar 2")[1:] == pytest.approx(
-        [-0.4285714, -4.338192], rel=PRINTED
-    )
-    assert row_of(text, "bar 3")[1:] == pytest.approx(
-        [-0.8571429, -0.104956], rel=PRINTED
-    )
+    assert row_of(text, "bar 2")[1:] == approx([-0.4285714, -4.338192], rel=PRINTED)
+    assert row_of(text, "bar 3")[1:] == approx([-0.8571429, -0.104956], rel=PRINTED)
 
 
 def test_a_linkage_by_the_coordinates_of_its_joints(analyze):
@@ -145,7 +141,7 @@ def test_a_linkage_by_the_coordinates_of_its_joints(analyze):
         "B": (-2.32, -2.293),
         "E": (-2.591, 1.657),
     }.items():
-        assert row_of(text, name) == pytest.approx(place, rel=PRINTED)
+        assert row_of(text, name) == approx(place, rel=PRINTED)
     scene = fourbar.files.loads(COORDINATES)
     curve = fourbar.coupler_curve(scene, "E", steps=4000)
     x, y = (np.asarray(z) + o for z, o in zip(curve[2:], scene.origin, strict=True))
@@ -159,7 +155,7 @@ def list_columns(text):
     return [[float(cell) for cell in row] for row in rows if row]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_new_parallelogram_is_one_over_the_whole_turn(ask):
     """Two commands; 0.3924 cos(theta_2), at 0 and 180 deg as the limit."""
     ask("new", "tp.toml", "--lengths", "300mm", "100mm", "300mm", "100mm")
@@ -167,12 +163,12 @@ def test_a_new_parallelogram_is_one_over_the_whole_turn(ask):
     assert text.startswith('Parallelogram "New linkage", open branch:')
     assert "ntiparallelogram" not in text
     assert "change points at theta_2 = 0 deg and 180 deg" in text
-    assert row_of(text, "torque")[0] == pytest.approx(392.4, rel=PRINTED)
+    assert row_of(text, "torque")[0] == approx(392.4, rel=PRINTED)
     rows = list_columns(ask("analyze", "tp.toml", "--columns", "theta_2,torque"))
     assert len(rows) == 361
     for theta_2, torque in rows:
         right = 0.3924 * np.cos(np.radians(theta_2))
-        assert torque == pytest.approx(right, abs=2e-6), theta_2
+        assert torque == approx(right, abs=2e-6), theta_2
 
 
 COUPLE = """\
@@ -197,15 +193,15 @@ gravity = ["9.81 m/s^2", "-90 deg"]
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_given_couple_moves_two_parallel_links_from_rest(analyze):
     """alpha = 14.8148 - 6.54 cos 30 deg; the upper link carries 2.139 kN."""
     text = analyze(COUPLE, "--at", "30 deg")
     assert text.startswith("Parallelogram")
     right = [30.0, 2.9957, 14.8148148 - 6.54 * np.cos(np.radians(30.0))]
-    assert row_of(text, "bar 2") == pytest.approx(right, rel=1e-4)
-    assert row_of(text, "F43 at B")[2] == pytest.approx(2.139, rel=1e-3)
-    assert row_of(text, "F14 at O4")[2] == pytest.approx(2.139, rel=1e-3)
+    assert row_of(text, "bar 2") == approx(right, rel=1e-4)
+    assert row_of(text, "F43 at B")[2] == approx(2.139, rel=1e-3)
+    assert row_of(text, "F14 at O4")[2] == approx(2.139, rel=1e-3)
 
 
 RODS = """\
@@ -232,17 +228,17 @@ def test_steel_rods_by_their_density(analyze):
     """
     text = analyze(RODS)
     peak, place, rms = row_of(text, "torque")
-    assert (peak, rms) == pytest.approx((-3.04213, 1.01795), rel=2e-4)
-    assert place == pytest.approx(2.517, abs=0.02)
+    assert (peak, rms) == approx((-3.04213, 1.01795), rel=2e-4)
+    assert place == approx(2.517, abs=0.02)
     pins = row_of(text, "peak", after="pins")
-    assert pins == pytest.approx([14.974, 14.151, 8.728, 7.907], rel=5e-4)
+    assert pins == approx([14.974, 14.151, 8.728, 7.907], rel=5e-4)
     moments, stresses = (
         np.array(row_of(text, label, after="bending")) for label in ("moment", "stress")
     )
     modulus = np.pi * 0.02**3 / 32.0
-    assert 1e6 * stresses == pytest.approx(moments / modulus, rel=1e-3)
+    assert 1e6 * stresses == approx(moments / modulus, rel=1e-3)
     rows = list_columns(analyze(RODS, "--columns", "shaking_force"))
-    assert max(rows)[0] == pytest.approx(12.7176, rel=1e-4)
+    assert max(rows)[0] == approx(12.7176, rel=1e-4)
 
 
 PER_LENGTH = """\
@@ -284,7 +280,7 @@ length = "1e6 ft"
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_frame_with_a_spring_on_a_roller(ask, tmp_path):
     """V = 160 sin(theta) + 100 cos^2(theta) lbf ft: sin(theta) = 0.8, or upright."""
     (tmp_path / "frame.toml").write_text(GUIDED)
@@ -292,7 +288,7 @@ def test_a_frame_with_a_spring_on_a_roller(ask, tmp_path):
     tilt = np.degrees(np.arcsin(0.8))
     rows = re.findall(r"^ *([0-9.]+) +[0-9.]+ open +(\w+)", text, re.MULTILINE)
     angles = [float(angle) for angle, _ in rows]
-    assert angles == pytest.approx([tilt, 90.0, 180.0 - tilt], abs=PRINTED * 90.0)
+    assert angles == approx([tilt, 90.0, 180.0 - tilt], abs=PRINTED * 90.0)
     assert [kind for _, kind in rows] == ["unstable", "stable", "unstable"]
 
 
@@ -401,7 +397,7 @@ gravity = ["1 g_0", "-90 deg"]
 }
 
 
-@pytest.mark.parametrize("task", TASKS)
+@mark.parametrize("task", TASKS)
 def test_a_task_of_a_textbook_or_a_forum(task, analyze):
     """A file, a command."""
     text, words, accuracy, rows = TASKS[task]
@@ -413,4 +409,4 @@ def test_a_task_of_a_textbook_or_a_forum(task, analyze):
             printed = printed[-1]
         else:
             printed = printed[: len(numbers)]
-        assert printed == pytest.approx(numbers, **accuracy), label
+        assert printed == approx(numbers, **accuracy), label

@@ -3,7 +3,7 @@
 import dataclasses
 import re
 
-import pytest
+from pytest import MonkeyPatch, fixture, importorskip, mark
 
 from fourbar import Motion, solve
 from fourbar.effects import PinFriction
@@ -37,10 +37,10 @@ OF_A_SCENE = ("assembled", "undecided", "torque_inertia", "drive_force_inertia")
 TYPES = {"string": str, "double": float, "boolean": bool}
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def results(tmp_path_factory):
     out = tmp_path_factory.mktemp("run") / "results"
-    with pytest.MonkeyPatch.context() as monkeypatch:
+    with MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         suite = Random(8, 1, tuple(DrawnType))
         plan = Plan(suite, choose_engines("free-body"), workers=1, drawn=False)
@@ -80,7 +80,7 @@ def test_every_engine_is_described():
     assert names | {FORMULAS} == set(WORK)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_quantity_of_a_scene_is_described(results):
     table = PAGE.partition("## Quantities of a scene")[2].partition("## Queries")[0]
     described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
@@ -121,14 +121,14 @@ def test_the_parquet_file_holds_the_rows_of_the_table(results):
     assert kept == table
 
 
-@pytest.fixture
+@fixture
 def beside_accepted(results, monkeypatch):
     """Where the page's programs stand: the run beside it is accepted."""
     monkeypatch.chdir(results.parent)
     assert status(["accept", "results"]) == 0
 
 
-@pytest.mark.usefixtures("beside_accepted")
+@mark.usefixtures("beside_accepted")
 def test_the_pandas_snippet_runs(capsys):
     rows, accepted = re.findall("```python\n(.*?)```", PAGE, re.DOTALL)
     exec(rows, {})
@@ -140,9 +140,9 @@ def test_the_pandas_snippet_runs(capsys):
     assert not len(names["failing"]) and len(names["times"])
 
 
-@pytest.mark.usefixtures("beside_accepted")
+@mark.usefixtures("beside_accepted")
 def test_the_sql_runs():
-    duckdb = pytest.importorskip("duckdb", reason="DuckDB is optional")
+    duckdb = importorskip("duckdb", reason="DuckDB is optional")
     rows, accepted = re.findall("```sql\n(.*?)```", PAGE, re.DOTALL)
     assert ("free-body", "torque") in {row[:2] for row in duckdb.sql(rows).fetchall()}
     assert (

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import pytest
+from pytest import fixture, mark, skip
 
 from fourbar.errors import BROKEN, HOLDS, LONGEST_MESSAGE, InputError
 from fourbar_validation.regression.record import ACCEPTED, find_baseline, open_run
@@ -17,7 +17,7 @@ from tests.support.checkout import ROOT, run_line
 MUTATIONS = int(os.environ.get("MUTATIONS", "40"))
 
 
-@pytest.fixture
+@fixture
 def locked():
     """A folder that its user may read and not write, with a scene."""
     folder = Path(tempfile.mkdtemp())
@@ -28,9 +28,9 @@ def locked():
     shutil.rmtree(folder)
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.parametrize(
+@mark.slow
+@mark.posix
+@mark.parametrize(
     ("line", "ends"),
     [
         ("fourbar analyze scene.toml", HOLDS),
@@ -46,7 +46,7 @@ def test_a_user_who_may_write_nowhere_gets_numbers_or_one_line(locked, line, end
     rights = []
     if os.geteuid() == 0:  # to whom no folder is locked, but by this
         if shutil.which("setpriv") is None:
-            pytest.skip("root has all rights, and setpriv takes none away")
+            skip("root has all rights, and setpriv takes none away")
         rights = ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner"]
     done = run_line(
         [*rights, sys.executable, "-m", *line.split()],
@@ -82,8 +82,8 @@ def damage(table, rng):
     return bytes(changed)
 
 
-@pytest.mark.slow
-@pytest.mark.linux
+@mark.slow
+@mark.linux
 def test_a_damaged_table_is_refused_or_read(tmp_path):
     """Each in a process of its own, which a fault of the reader would end."""
     table = (find_baseline(ACCEPTED) / "results.parquet").read_bytes()

@@ -7,15 +7,15 @@ import importlib.util
 import runpy
 import sys
 
-import pytest
+from pytest import mark
 
 from tests.support.checkout import ROOT, run_python
 
 PAGE = "tests/support/user_code.py"
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(
+@mark.slow
+@mark.skipif(
     importlib.util.find_spec("pyright") is None,
     reason="not run: pyright is not installed: pip install 'pyright[nodejs]'",
 )

@@ -15,8 +15,7 @@ from math import degrees, tau
 from pathlib import Path
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -78,7 +77,7 @@ def read_csv(text):
     return list(csv.DictReader(io.StringIO(text)))
 
 
-@pytest.mark.parametrize("name", slow_but({"drag_link"}, ["thesis", "drag_link"]))
+@mark.parametrize("name", slow_but({"drag_link"}, ["thesis", "drag_link"]))
 def test_json_and_csv_have_every_key_and_every_digit(name, show):
     file = MODELS / f"{name}.toml"
     document = strict(show("analyze", file, "--json"))
@@ -111,7 +110,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
     assert row["torque [N m]"] == "" and row["theta_2 [rad]"] == "1.0"
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_free_motion_has_time_and_no_drive(show):
     released = Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
     save(crank_rocker(motion=released), "scene.toml")
@@ -119,7 +118,7 @@ def test_a_free_motion_has_time_and_no_drive(show):
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "command, write", [("sdf", assembly.write_sdf), ("usd", assembly.write_usd)]
 )
 def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
@@ -134,7 +133,7 @@ def test_sdf_and_usd_are_written_of_four_lengths_and_name_what_they_leave_out(
     show(command, CRANK_ROCKER, "--without-loads", "-o", "a")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "asked, printed, text",
     [
         ((CRANK_ROCKER,), [], write_mjcf_for(load(CRANK_ROCKER))),
@@ -154,7 +153,7 @@ def test_what_rests_at_every_angle_is_no_range_of_one(show):
     assert "indifferent (Q = 0 throughout): everywhere on its circuit" in out
 
 
-@pytest.mark.slow
+@mark.slow
 def test_degrees_are_of_angles_alone_and_named(show):
     plain = strict(show("analyze", CRANK_ROCKER, "--json"))
     turned = strict(show("analyze", CRANK_ROCKER, "--json", "--degrees"))
@@ -176,7 +175,7 @@ def test_degrees_are_of_angles_alone_and_named(show):
 ROW = re.compile(r" *\d+\.\d{4} ")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_table_of_positions_says_in_what_units_and_may_be_thinned(show):
     lines = show("analyze", THESIS, "--table").split("\n")
     assert lines[0] == "Thesis model mechanism" and len(lines) > 361
@@ -269,7 +268,7 @@ CLASSIFIED = read_rows("""
 """)
 
 
-@pytest.mark.parametrize("lengths, line", CLASSIFIED)
+@mark.parametrize("lengths, line", CLASSIFIED)
 def test_classify(lengths, line, show):
     assert line in show("classify", *lengths.split())
 
@@ -328,7 +327,7 @@ NEW = read_rows("""
 """Lengths as people write them, and in metres."""
 
 
-@pytest.mark.parametrize("texts, metres", NEW)
+@mark.parametrize("texts, metres", NEW)
 def test_new_writes_a_file_and_names_the_command_that_reads_it(
     texts, metres, show, run
 ):
@@ -340,7 +339,7 @@ def test_new_writes_a_file_and_names_the_command_that_reads_it(
     assert load("my wiper.toml").linkage.lengths == approx(lengths, rel=1e-15)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "bars",
     [
         ("--lengths", "300mm", "100mm", "250mm", "220mm"),
@@ -367,8 +366,8 @@ animate @gallery/pump_jack.toml --seconds 0.12 -o a.gif | : 3 frames | GIF89a
 """Commands, what is said of the file, and what it holds."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line, said, holds", DRAWINGS)
+@mark.slow
+@mark.parametrize("line, said, holds", DRAWINGS)
 def test_plot_and_animate_write_what_their_ending_says(line, said, holds, show):
     """Without an option they show the units of the scene: those of the pump-jack are
     inches and pounds.
@@ -379,7 +378,7 @@ def test_plot_and_animate_write_what_their_ending_says(line, said, holds, show):
     assert holds.encode() in file.read_bytes()
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "error, code",
     [
         (RuntimeError("two\nlines"), BROKEN),
@@ -401,11 +400,11 @@ def test_what_goes_wrong_is_one_line_and_a_status(error, code, run, monkeypatch)
     assert not Path("out").exists()
     if isinstance(error, RuntimeError):
         monkeypatch.setenv("FOURBAR_TRACEBACK", "1")
-        with pytest.raises(RuntimeError):
+        with raises(RuntimeError):
             run("analyze", THESIS)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_full_disk_leaves_the_old_file(run, monkeypatch, tmp_path):
     def full(_):
         raise OSError(28, "No space left on device")
@@ -427,7 +426,7 @@ def test_the_name_of_a_file_asks_for_its_form(show):
         assert file.read_text() == expected
 
 
-@pytest.mark.posix
+@mark.posix
 def test_a_device_is_written_to_and_stays_one(show):
     pipe = Path("pipe")
     os.mkfifo(pipe)
@@ -449,7 +448,7 @@ def test_a_title_does_not_steer_the_terminal(show):
     assert strict(show("analyze", "scene.toml", "--json"))["title"] == title
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_command_line_starts_light():
     heavy = ["pint", "rich", "matplotlib", "scipy", "mujoco", "pinocchio", "jinja2"]
     program = "import sys, fourbar.cli; print({*sys.argv[1:]} & {*sys.modules})"
@@ -558,7 +557,7 @@ sixth = "1 mm"
 """
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, words",
     [
         *(case.split("\n", 1)[::-1] for case in REFUSED_FILES.split("---\n")),
@@ -631,7 +630,7 @@ analyze @drag_link.toml --positions none.toml:theta_4 | none.toml
 """Command lines, and words of the line that refuses them; @ stands for the models."""
 
 
-@pytest.mark.parametrize("line, words", REFUSED)
+@mark.parametrize("line, words", REFUSED)
 def test_arguments_are_refused_in_one_line_and_nothing_is_written(
     line, words, run, tmp_path
 ):
@@ -639,7 +638,7 @@ def test_arguments_are_refused_in_one_line_and_nothing_is_written(
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "out, why",
     [
         ("no/out", "no such folder"),
@@ -647,7 +646,7 @@ def test_arguments_are_refused_in_one_line_and_nothing_is_written(
         ("a", "is read here"),
     ],
 )
-@pytest.mark.parametrize("command", ["analyze", "mjcf"])
+@mark.parametrize("command", ["analyze", "mjcf"])
 def test_an_output_that_cannot_be_is_refused_before_anything_is_solved(
     command, out, why, run, monkeypatch, tmp_path
 ):
@@ -665,7 +664,7 @@ def test_an_angle_of_more_than_half_a_turn_is_that_of_the_sweep(show):
     assert shown["theta_4"] == approx([233.8003], abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ["law_sine", "released"])
+@mark.parametrize("name", ["law_sine", "released"])
 def test_an_angle_of_a_motion_over_time_is_that_of_each_instant(show, name):
     """A released motion begins at its angle, and passes it again."""
     file = MODELS / "capabilities" / f"{name}.toml"

@@ -6,7 +6,7 @@ Pipes are read to their end.
 import subprocess
 import sys
 
-import pytest
+from pytest import fixture, mark
 
 from fourbar.cli import status
 from fourbar_validation.places import MODELS
@@ -16,7 +16,7 @@ from tests.support.shares import slow_but
 SCENE = MODELS / "crank_rocker.toml"
 
 
-@pytest.fixture
+@fixture
 def call(monkeypatch, capfdbinary, tmp_path):
     """Runs the command line with a scene on its standard input."""
     monkeypatch.chdir(tmp_path)
@@ -29,9 +29,9 @@ def call(monkeypatch, capfdbinary, tmp_path):
     return run
 
 
-@pytest.mark.slow
-@pytest.mark.posix
-@pytest.mark.parametrize("name", ["-", "/dev/stdin", f"<(cat '{SCENE}')"])
+@mark.slow
+@mark.posix
+@mark.parametrize("name", ["-", "/dev/stdin", f"<(cat '{SCENE}')"])
 def test_a_scene_is_read_from_standard_input_and_from_a_pipe_of_the_shell(name, call):
     """The block would have the units of the file."""
     line = f"{sys.executable} -m fourbar analyze {name} --json < '{SCENE}'"
@@ -50,7 +50,7 @@ animate - | <!doctype html>
 """)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "arguments, start",
     slow_but(STARTS[:5], STARTS),
 )

@@ -3,13 +3,13 @@
 import re
 from dataclasses import replace
 
-import pytest
+from pytest import importorskip, mark
 
 import fourbar
 from fourbar import solve
 from fourbar.show.shown_units import COMMON
 
-pytest.importorskip(
+importorskip(
     "tomlkit",
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
@@ -36,7 +36,7 @@ def load_coarse(name):
     return replace(scene, motion=scene.motion.replace(angle=coarse))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name",
     slow_but({"gallery/bonnet_hinge", "capabilities/cylinder_3_4"}, BOUNDED),
 )
@@ -56,7 +56,7 @@ def test_the_headline_says_that_dry_friction_at_rest_is_left_out():
     assert "; dry friction at rest taken as 0; " in headline
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name",
     slow_but({"thesis"}, UNBOUNDED),
 )
@@ -70,7 +70,7 @@ def test_what_grows_without_bound_is_no_number(name):
     assert unbounded & {"torque", "drive_force"}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
     scene = fourbar.load(MODELS / "capabilities/parallelogram.toml")

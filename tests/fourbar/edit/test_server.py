@@ -17,16 +17,15 @@ import time
 import warnings
 from pathlib import Path
 
-import pytest
-from pytest import raises
+from pytest import fixture, importorskip, mark, raises
 
 from fourbar import InputError
 
-pytest.importorskip(
+importorskip(
     "tornado",
     reason="the workbench is served by tornado: pip install tornado",
 )
-pytest.importorskip(
+importorskip(
     "tomlkit",
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
@@ -48,7 +47,7 @@ LEFT = REDIRECT_PAGE.format(address="http://127.0.0.1:4000/token/")
 """The page of a server that was killed."""
 
 
-@pytest.fixture
+@fixture
 def path(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(CRANK_ROCKER.read_bytes())
@@ -68,7 +67,7 @@ def wait_until(happened):
         time.sleep(0.05)
 
 
-@pytest.fixture
+@fixture
 def bench(path, monkeypatch, capsys):
     """Return a function that runs a coroutine with a listening workbench and its
     address.
@@ -197,7 +196,7 @@ def test_only_a_page_with_the_token_from_this_address_is_answered(bench):
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
     async def ask(made, address):
         host, port = address.split("/")[2].split(":")
@@ -220,7 +219,7 @@ def test_a_request_of_a_hundred_megabytes_is_not_read(bench):
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_hundred_requests_at_once_are_answered(bench):
     async def ask(made, address):
         assert await asyncio.gather(*(status(address) for _ in range(30))) == [200] * 30
@@ -234,7 +233,7 @@ def test_a_hundred_requests_at_once_are_answered(bench):
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_error_bars_follow_and_every_page_sees_the_change(bench):
     async def ask(made, address):
         first_page, second_page = await page(address), await page(address)
@@ -253,7 +252,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench):
     assert session.state_file.exists()  # it is not saved
 
 
-@pytest.mark.slow
+@mark.slow
 def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
     collect, changed, finished = server.collect_tolerances, threading.Event(), []
 
@@ -278,7 +277,7 @@ def test_samples_of_a_scene_that_has_changed_are_given_up(bench, monkeypatch):
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
     async def ask(made, address):
         one = await page(address)
@@ -294,7 +293,7 @@ def test_it_ends_when_the_last_page_has_gone_and_not_before(bench):
     assert not bench(ask).state_file.exists()  # nothing was changed
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench, monkeypatch
 ):
@@ -334,7 +333,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch):
     evaluate = session.evaluate_scene
     asked_for = threading.Event()
@@ -367,7 +366,7 @@ def test_a_change_overtakes_a_summary_that_is_being_computed(bench, monkeypatch)
     bench(ask)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_line_of_a_page_that_does_not_read_is_closed(bench, caplog, monkeypatch):
     """One page changes the scene, another one that reads nothing is told each time."""
     monkeypatch.setattr(server, "PING", 0.5)
@@ -392,7 +391,7 @@ def test_the_line_of_a_page_that_does_not_read_is_closed(bench, caplog, monkeypa
     assert not caplog.records
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_picture_is_served_as_an_image_alone(bench, path):
     """An SVG opened by its address runs no script and reaches nothing here."""
 
@@ -412,8 +411,8 @@ def test_the_picture_is_served_as_an_image_alone(bench, path):
     bench(ask)
 
 
-@pytest.mark.slow
-@pytest.mark.posix
+@mark.slow
+@mark.posix
 def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_processes(
     path,
 ):
@@ -434,8 +433,8 @@ def test_the_browser_gets_a_private_page_and_the_token_stands_in_no_list_of_proc
     assert not redirect.exists()
 
 
-@pytest.mark.slow
-@pytest.mark.posix
+@mark.slow
+@mark.posix
 def test_a_second_workbench_on_one_file_leads_to_the_first(path):
     link = path.with_name("link.toml")
     link.symlink_to(path)
@@ -455,7 +454,7 @@ def test_a_second_workbench_on_one_file_leads_to_the_first(path):
     assert not path.with_name(path.name + REDIRECT_ENDING).exists()
 
 
-@pytest.mark.posix
+@mark.posix
 def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     tmp_path, monkeypatch
 ):
@@ -469,8 +468,8 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     second.remove()
 
 
-@pytest.mark.posix
-@pytest.mark.parametrize("content", ["<html>", LEFT + "<p>"], ids=["other", "longer"])
+@mark.posix
+@mark.parametrize("content", ["<html>", LEFT + "<p>"], ids=["other", "longer"])
 def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
     tmp_path, content
 ):
@@ -482,8 +481,8 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
     assert (page.read_text(), page.stat().st_mode & 0o777) == (content, 0o644)
 
 
-@pytest.mark.posix
-@pytest.mark.parametrize("left", ["", LEFT])
+@mark.posix
+@mark.parametrize("left", ["", LEFT])
 def test_an_empty_page_and_one_of_a_killed_server_are_written_over(tmp_path, left):
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(left)
@@ -495,8 +494,8 @@ def test_an_empty_page_and_one_of_a_killed_server_are_written_over(tmp_path, lef
     redirect.remove()
 
 
-@pytest.mark.slow
-@pytest.mark.posix
+@mark.slow
+@mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path):
     began = time.monotonic()
     with start(path, "--no-browser") as process:

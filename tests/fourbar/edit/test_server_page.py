@@ -8,13 +8,12 @@ import time
 from math import cos, degrees, hypot, remainder, sin
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx
+from pytest import approx, fixture, importorskip, mark
 
 from fourbar import load, solve
 
-pytest.importorskip(
+importorskip(
     "selenium",
     reason="pages are driven by selenium: pip install selenium",
 )
@@ -27,7 +26,7 @@ from fourbar_validation.places import MODELS
 from tests.fourbar.edit.test_server import start
 from tests.support.scenes import find_angle
 
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 
 PRINTED = 6e-5
 """Numbers are shown with five significant digits."""
@@ -142,12 +141,12 @@ class Page:
         self.wait(SAVED)
 
 
-@pytest.fixture
+@fixture
 def path(tmp_path):
     return tmp_path / "mine.toml"
 
 
-@pytest.fixture
+@fixture
 def page(chromium):
     """The one browser, whose console must be empty but where a line was cut."""
     page = Page(chromium)

@@ -13,9 +13,8 @@ import tomllib
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_array_equal
-from pytest import approx, raises
+from pytest import approx, fixture, importorskip, mark, raises
 
 import fourbar
 from fourbar import solve
@@ -23,7 +22,7 @@ from fourbar.edit.dragging import write_rounded
 from fourbar.files import loads
 from fourbar.quantities.units import find_unit
 
-pytest.importorskip(
+importorskip(
     "tomlkit",
     reason="the workbench edits scene files by tomlkit: pip install tomlkit",
 )
@@ -65,12 +64,12 @@ def start(folder, model):
     return Session(path, folder / "exports")
 
 
-@pytest.fixture
+@fixture
 def session(tmp_path):
     return start(tmp_path, CRANK_ROCKER)
 
 
-@pytest.fixture
+@fixture
 def new(tmp_path):
     """A session whose file is not there yet."""
     return Session(tmp_path / "new.toml", tmp_path / "exports")
@@ -114,9 +113,7 @@ def leaves(value, path=()):
         yield from leaves(inner, (*path, step))
 
 
-@pytest.mark.parametrize(
-    "path", slow_but(FILES[::4], FILES), ids=lambda path: path.stem
-)
+@mark.parametrize("path", slow_but(FILES[::4], FILES), ids=lambda path: path.stem)
 def test_a_file_is_unchanged_on_a_round_trip_and_one_number_changes_one_place(path):
     text = path.read_bytes().decode()
     document = SceneDocument(text)
@@ -145,7 +142,7 @@ PARTS = list_offers()["parts"]
 NAMES = {"points": "P", "tolerances": "lengths.input"}
 
 
-@pytest.mark.parametrize("part", PARTS, ids=lambda part: str(part["at"]))
+@mark.parametrize("part", PARTS, ids=lambda part: str(part["at"]))
 def test_each_part_that_is_offered_is_one_that_the_file_takes(part):
     document = SceneDocument(CRANK_ROCKER.read_text())
     place = [step or NAMES[part["at"][0]] for step in part["at"]]
@@ -191,7 +188,7 @@ MASS_PER_METRE = {
 """Numbers of which a bar states one, with its mass per metre by the offered fields."""
 
 
-@pytest.mark.parametrize("stated", MASS_PER_METRE)
+@mark.parametrize("stated", MASS_PER_METRE)
 def test_each_field_that_is_offered_is_one_that_the_file_takes(stated):
     fields = dict(leaves(list_offers()["fields"]))
     document = SceneDocument(CRANK_ROCKER.read_text())
@@ -253,7 +250,7 @@ REFUSED = [
 """Requests, and words of their refusal."""
 
 
-@pytest.mark.parametrize("asked, words", REFUSED)
+@mark.parametrize("asked, words", REFUSED)
 def test_what_is_refused_leaves_the_last_good_state(session, asked, words):
     text, files = session.now.text, {*session.path.parent.iterdir()}
     assert words in session.do(json.loads(asked))["refused"]
@@ -331,7 +328,7 @@ P = { bar = 3, from_pin = ["1 in", "20 deg"] }
 """
 
 
-@pytest.fixture
+@fixture
 def loaded(session):
     """A session with a point, a spring, a couple, and a place by coordinates."""
     ask(session, "text", text=session.document.text() + LOADED)
@@ -375,7 +372,7 @@ DRAGGED = {
 }
 
 
-@pytest.mark.parametrize("name", DRAGGED)
+@mark.parametrize("name", DRAGGED)
 def test_what_is_dragged_stands_where_it_was_dragged_to(loaded, name):
     what, place_of = DRAGGED[name]
     to = {"B": 0.2 + 0.25j, "O4": 0.33 + 0.05j}.get(name, TO)
@@ -399,8 +396,8 @@ def test_a_ground_by_coordinates_is_dragged_by_them(session):
     assert "ground_angle" not in session.now.plain["lengths"]
 
 
-@pytest.mark.parametrize("frame", ["world", "bar"])
-@pytest.mark.parametrize("size", ["5 N", "-5 N"])
+@mark.parametrize("frame", ["world", "bar"])
+@mark.parametrize("size", ["5 N", "-5 N"])
 def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays(
     loaded, frame, size
 ):
@@ -427,7 +424,7 @@ def test_a_place_by_coordinates_stays_so_until_it_is_restated(loaded):
         assert loaded.now.scene.loads[3].from_pin == approx(stated, rel=1e-5)
 
 
-@pytest.mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
+@mark.parametrize("command", ["theta_3", "theta_4", "stroke"])
 def test_another_command_goes_over_the_same_motion(tmp_path, command):
     session = start(tmp_path, BUCKET)
     before = solve(session.now.scene)
@@ -445,7 +442,7 @@ def test_another_command_goes_over_the_same_motion(tmp_path, command):
     assert ask(session, "undo")["text"] == BUCKET.read_text()
 
 
-@pytest.mark.parametrize("shown", [0.2, 2.0, 5.0])
+@mark.parametrize("shown", [0.2, 2.0, 5.0])
 def test_another_command_goes_over_the_position_that_is_shown(session, shown):
     """The output of a crank-rocker turns back twice.
 
@@ -462,7 +459,7 @@ def test_what_does_not_move_cannot_be_commanded(session):
     assert "does not move" in refused
 
 
-@pytest.mark.parametrize("dead_centre", [0, 1])
+@mark.parametrize("dead_centre", [0, 1])
 def test_a_bar_that_is_shown_turning_back_is_commanded_at_a_speed(session, dead_centre):
     """It is that of the middle of its swing, where the shown position has none."""
     limits = fourbar.limit_positions(session.now.scene.linkage, 4)
@@ -479,8 +476,8 @@ def test_a_state_that_assembles_nowhere_names_what_it_commands(session):
         evaluate_scene(scene, {})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@mark.slow
+@mark.parametrize("side", [1.0, -1.0])
 def test_four_pins_are_a_linkage_that_assembles_where_it_is_drawn(new, side):
     assert ask(new, "hello")["fresh"]
     ask(new, drawn([[x, side * y] for x, y in PINS_DRAWN]))
@@ -507,7 +504,7 @@ def test_what_was_typed_stays_when_another_linkage_is_drawn(new):
     assert coupler.length == approx(INCH * math.hypot(11, 8), abs=INCH * 0.01)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "value, pixel, written",
     [
         (0.123456, 0.003, "0.123 m"),
@@ -519,7 +516,7 @@ def test_numbers_get_the_digits_of_a_pixel(value, pixel, written):
     assert write_rounded(value, pixel, "m") == written
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, other, unit",
     read_rows("""
 12 1/2 in | m | in
@@ -562,7 +559,7 @@ def test_the_answer_is_what_analyze_says(session):
     assert "lbf" in "\n".join(settled(session)["data"]["summary"])
 
 
-@pytest.mark.parametrize("stated", ["60 deg", ["0 deg", "60 deg"]])
+@mark.parametrize("stated", ["60 deg", ["0 deg", "60 deg"]])
 def test_what_is_compared_is_the_peak_of_the_same_positions(session, stated):
     """The curves of one position go on over the whole range, where no peak is located.
 
@@ -575,13 +572,13 @@ def test_what_is_compared_is_the_peak_of_the_same_positions(session, stated):
     assert bool(here) == isinstance(stated, list)
 
 
-@pytest.mark.parametrize("path", SHOWN, ids=lambda path: path.stem)
+@mark.parametrize("path", SHOWN, ids=lambda path: path.stem)
 def test_every_linkage_that_people_know_has_an_answer(tmp_path, path):
     told = Session(path, tmp_path / "exports").answer()
     assert unpacked(pack_frame(told))["columns"]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_an_answer_takes_ten_bare_solves_at_most(session):
     """By turns, in processor time, and the quickest of each: the machine has other
     work. What the other tests hold is not searched for garbage in here.
@@ -655,7 +652,7 @@ kept is a list | "kept": { | "kept": [], "others": {
 """What is wrong, a pattern in the text of a state, and what stands in its place."""
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "pattern, damage",
     [*(row[1:] for row in DAMAGES), (".*", "[" * 100_000)],
     ids=[*(row[0] for row in DAMAGES), "nested deeply"],
@@ -694,7 +691,7 @@ def test_exports_go_into_their_folder_under_their_own_names(session):
         assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "kind, content, name",
     [
         ("png", PNG, "scene.png"),

@@ -4,8 +4,7 @@ import json
 from math import pi, tau
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -55,7 +54,7 @@ CONES = read_rows("""
 NUMBERS = {"none": NO_SOLUTION, "one": ONE_SOLUTION, "many": MANY}
 
 
-@pytest.mark.parametrize("F, C, number, x, far", CONES)
+@mark.parametrize("F, C, number, x, far", CONES)
 def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     """On a line F = 1, C = c: x = k (1 + c x), x = k |1 - c x|.
 
@@ -71,7 +70,7 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
         assert find_least_stretch(sliding.slope)[0] == distance
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "c1, c2, number",
     [
         (0.5, 0.3, ONE_SOLUTION),
@@ -151,7 +150,7 @@ def test_a_gas_spring_of_one_force_pushes_with_it_everywhere():
     assert Spring.gas(*HERE, 0.5, 0.3, 40.0) == Spring(*HERE, 0.0, 0.5, -40.0)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "make, numbers, key",
     [
         (Spring, (*[Place(2, (0.1, 0.0))] * 2, 1.0), "effects.springs.to.bar"),

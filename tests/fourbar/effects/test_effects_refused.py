@@ -1,7 +1,6 @@
 """What a file may not state of places, drives and springs, each refused in one line."""
 
-import pytest
-from pytest import raises
+from pytest import mark, raises
 
 from fourbar import InputError
 from fourbar.files import loads
@@ -35,7 +34,7 @@ point | point = "handle"\n | bar = 2\nfrom_pin = ["0 m", "0 deg"]\n | bar 1 hold
 """A file, what is replaced in it and by what, and words of the refusal."""
 
 
-@pytest.mark.parametrize("name, old, new, words", REFUSED)
+@mark.parametrize("name, old, new, words", REFUSED)
 def test_what_a_file_states_wrongly_is_refused_with_what_to_write(
     name, old, new, words
 ):

@@ -8,9 +8,8 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Friction,
@@ -47,7 +46,7 @@ def ends(start_bar, end_bar):
     return LinearDrive(start, Place(end_bar, (0.09, 0.7)))
 
 
-@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
+@mark.parametrize("start_bar, end_bar", PAIRS)
 def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     start_bar, end_bar
 ):
@@ -78,7 +77,7 @@ ALONG_CRANK = PointDrive(Place(2, (0.1, 0.0)), 0.0, "bar")
 PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "lengths, drive, branch, status",
     [
         (CRANK_ROCKER_LENGTHS, CROSSES_O2, 1, ["no_lever", "ok", "no_lever"]),
@@ -117,7 +116,7 @@ KEEP_THEIR_DISTANCE = read_rows("""
 """Bar, distance and angle of both ends."""
 
 
-@pytest.mark.parametrize("ends", KEEP_THEIR_DISTANCE)
+@mark.parametrize("ends", KEEP_THEIR_DISTANCE)
 def test_ends_that_keep_their_distance_are_refused_in_one_line(ends):
     rows = (map(float, end.split()) for end in ends)
     drive = LinearDrive(*(Place(int(bar), tuple(at)) for bar, *at in rows))
@@ -150,7 +149,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
         vary(scene, {"drive.from.bar": [2]})
 
 
-@pytest.mark.parametrize("start_bar, end_bar", PAIRS)
+@mark.parametrize("start_bar, end_bar", PAIRS)
 def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     motion = Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
     scene = crank_rocker(drive=ends(start_bar, end_bar), motion=motion)

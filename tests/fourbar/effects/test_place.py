@@ -5,9 +5,8 @@ Places of bars in every form, loads at them, and the cases that people brought.
 
 import json
 
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import InputError, Load, Place, Point, Spring, solve
@@ -32,7 +31,7 @@ def test_a_pull_at_the_tip_of_massless_bars():
     assert torque[0] == approx(1.656231, abs=PRINTED)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "make, stated",
     [
         *(
@@ -56,7 +55,7 @@ def test_python_refuses_what_is_no_place(make, stated):
         make(**stated)
 
 
-@pytest.mark.parametrize("points", [(), (Point("P", 4, (0.1, 0.0)),)])
+@mark.parametrize("points", [(), (Point("P", 4, (0.1, 0.0)),)])
 def test_python_refuses_a_load_at_a_point_that_its_bar_has_not(points):
     with raises(InputError):
         crank_rocker(loads=(Load(3, (1.0, 0.0), point="P"),), points=points)

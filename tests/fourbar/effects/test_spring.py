@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar import (
     Motion,
@@ -84,9 +84,9 @@ crank as the output | 0.3 0.22 0.25 0.1
 """Ground, input, coupler, output, m."""
 
 
-@pytest.mark.parametrize("bar", (2, 3, 4))
-@pytest.mark.parametrize("branch", slow_but({-1}, (1, -1)))
-@pytest.mark.parametrize("name, lengths", COUNTED)
+@mark.parametrize("bar", (2, 3, 4))
+@mark.parametrize("branch", slow_but({-1}, (1, -1)))
+@mark.parametrize("name, lengths", COUNTED)
 def test_turns_are_counted_whichever_bar_is_commanded(name, lengths, branch, bar):
     """A spring winds as its pin turns along an assembly, in any order of positions."""
     link = replace(uniform(*map(float, lengths.split())), ground_angle=0.4)

@@ -8,9 +8,8 @@ from dataclasses import replace
 from math import degrees, isnan, radians, sin, sqrt
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 from scipy.integrate import quad
 
 from fourbar import (
@@ -111,7 +110,7 @@ def test_the_door_is_held_by_what_its_energy_asks():
     assert s.torque[0] - fastened.torque[0] == approx(0.0265373, abs=6e-8)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     sweep = 'theta_2 = { from = "40 deg", to = "150 deg", steps = 11 }'
     found = equilibrium(make_door(sweep, "")).found
@@ -119,7 +118,7 @@ def test_no_equilibrium_is_found_where_the_spring_would_have_to_pull():
     assert equilibrium(make_door(sweep)).found == ()
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_released_door_arrives_as_its_energy_says():
     """t = integral of d theta/omega, omega^2 = 2 (U(start) - U)/J."""
     motion = 'theta_2 = "150 deg"\nfree = { duration = "0.04 s", steps = 4000 }'
@@ -164,7 +163,7 @@ def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     assert by_length[0] == 0.0 and isnan(by_length[1]) and by_length[2] != 0.0
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "numbers, acts, words",
     read_rows("""
 200 0.05 0 | both | "push" or "pull"

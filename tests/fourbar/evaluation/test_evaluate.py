@@ -5,7 +5,7 @@ too large or missing.
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar import (
     Bar,
@@ -123,8 +123,8 @@ for name in (
     SCENES[name] = fault_scenes.FAULT_SCENES[name]
 
 
-@pytest.mark.parametrize("kind", ["long doubles", "pairs of doubles"])
-@pytest.mark.parametrize("name", SCENES)
+@mark.parametrize("kind", ["long doubles", "pairs of doubles"])
+@mark.parametrize("name", SCENES)
 def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
     scene = SCENES[name]
     if kind == "pairs of doubles":
@@ -141,8 +141,8 @@ def test_error_bars_are_of_the_size_of_the_error(name, kind, monkeypatch):
         assert np.median(width / np.maximum(error, half_a_digit)) < 5.0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("family", families.FAMILY_DRAWERS)
+@mark.slow
+@mark.parametrize("family", families.FAMILY_DRAWERS)
 def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     """The numbers of a machine whose long doubles are no longer than doubles."""
     monkeypatch.setattr(longer, "HAS_LONG_DOUBLES", False)
@@ -151,7 +151,7 @@ def test_error_bars_hold_with_pairs_of_doubles(family, monkeypatch):
     assert not any(tally.too_large.values()) and not tally.warned
 
 
-@pytest.mark.parametrize("angle", [2.0**24, 2.0**40])
+@mark.parametrize("angle", [2.0**24, 2.0**40])
 def test_an_error_bar_grows_with_the_angle(angle):
     """A crank under its weight, m g r cos(theta): theta less the ground's angle has 64
     bits.

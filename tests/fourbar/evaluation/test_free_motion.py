@@ -6,8 +6,7 @@ from dataclasses import replace
 from math import pi, radians
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 from scipy.optimize import brentq
 
 from fourbar import (
@@ -58,7 +57,7 @@ def integrate(linkage, effects, theta_2, omega_2, times, loads=()):
     return release_at(replace(scene, loads=loads), times)
 
 
-@pytest.mark.parametrize("bar", [2, 4])
+@mark.parametrize("bar", [2, 4])
 def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     """Bars without mass, of a drag link: alpha = M/J."""
     linkage, times = bare(0.1, 0.25, 0.3, 0.28), np.linspace(0.0, 2.0, 21)
@@ -91,7 +90,7 @@ system of 13 equations whose condition is below 1e4.
 """
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, says",
     [
         (Motion(1.0, 2.0), "motion.free"),
@@ -145,7 +144,7 @@ def compare_with_free_bodies(scene, s):
         assert (np.abs(answer.quantities["torque"]) <= lost).all()
 
 
-@pytest.mark.slow
+@mark.slow
 def test_pin_forces_pass_a_limit_position_smoothly():
     """theta_2, omega_2, alpha_2 as doubles do not hold the forces there.
 
@@ -178,8 +177,8 @@ def test_what_begins_to_move_against_friction_does_so_at_once():
         assert np.allclose(then, then[1], rtol=1e-4, atol=1e-5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("preload", (0.0, 5.0))
+@mark.slow
+@mark.parametrize("preload", (0.0, 5.0))
 def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(preload):
     """Rounding gives its pull a direction that differs at each step.
 
@@ -196,7 +195,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     assert np.abs(one - other).max() < 1e-9
 
 
-@pytest.mark.parametrize("sense", [1.0, -1.0])
+@mark.parametrize("sense", [1.0, -1.0])
 def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
     """Bars without mass: J alpha = -f, and rest after 0.5 s."""
     linkage, times = bare(*CRANK_ROCKER_LENGTHS), np.linspace(0.0, 1.0, 11)
@@ -206,7 +205,7 @@ def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
     assert np.abs(m.omega_2 - sense * left).max() < 1e-9
 
 
-@pytest.mark.parametrize("speed", [20.0, -20.0])
+@mark.parametrize("speed", [20.0, -20.0])
 def test_the_input_keeps_its_turns_while_the_output_is_read(speed):
     """A drag link that falls over is read in bar 4 where bar 2 is near a limit."""
     linkage = uniform(0.1, 0.15, 0.2, 0.2)
@@ -235,7 +234,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         assert set(released.command.branch) == {1}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = Torsion.at(O2=(0.01, 0.5, 0.0))
     still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
@@ -245,7 +244,7 @@ def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
         release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "omega, moment, gain, power, drift",
     [
         # from rest all kinetic energy E is work, and 1.01 E the largest of both

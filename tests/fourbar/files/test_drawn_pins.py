@@ -4,8 +4,7 @@ import os
 from math import atan2, hypot, pi, remainder, tau
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     InputError,
@@ -80,7 +79,7 @@ long-fuzz` takes 10 000.
 """
 
 
-@pytest.mark.parametrize("count", slow_but({100}, [100, DRAWINGS]))
+@mark.parametrize("count", slow_but({100}, [100, DRAWINGS]))
 def test_drawings_turned_into_lengths_come_back(count):
     random = np.random.default_rng(5)
     special = max(count // 20, 20)
@@ -164,7 +163,7 @@ def test_the_stroke_and_the_side_of_a_cylinder_are_drawn():
         assert loads(DRAWN + stated).motion.side == side
 
 
-@pytest.mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4", "stroke"])
+@mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4", "stroke"])
 def test_what_is_drawn_at_its_limit_is_singular_there(commanded):
     """Two bars are in line, or O2 and both ends of a cylinder, whatever is rounded."""
     random = np.random.default_rng(3)
@@ -189,7 +188,7 @@ to = {{ bar = 2, drawn = ["{3 * x} mm", "{3 * y} mm"] }}
         assert found == approx(pins[1:3], abs=1e-9)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "drive",
     [
         "",
@@ -201,7 +200,7 @@ to = { bar = 4, from_pin = { drawn = ["200 mm", "50 mm"] } }
 """,
     ],
 )
-@pytest.mark.parametrize("side", ["", 'side = "drawn"\n'])
+@mark.parametrize("side", ["", 'side = "drawn"\n'])
 def test_a_drawn_stroke_without_its_cylinder_is_refused(drive, side):
     """The drive is wrong, and not a side that the file need not state."""
     with raises(InputError, match=r"is of a cylinder \(\[drive\]\)") as raised:
@@ -241,7 +240,7 @@ def test_the_default_sweep_holds_the_drawn_position():
         assert abs(away) < 0.5 * (angles[-1] - angles[0])
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "old, new, says",
     read_rows(r"""
 [pins] | [lengths]\nground = "1 m"\n[pins] | the pins state the lengths
@@ -297,7 +296,7 @@ def test_a_ground_by_coordinates_and_a_place_drawn_on_it():
     assert scene.linkage.ground_angle == atan2(-0.07, -0.12)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "old, new, says",
     read_rows(r"""
 , y = "-70 mm" |  | lengths.ground.y: is missing
@@ -318,7 +317,7 @@ def test_a_drawing_on_a_change_point_is_refused():
         loads(write_pins((0, 1, 4, 3)))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_parallelogram_drawn_on_a_grid_is_one():
     """To a tenth of a millimetre the lengths of opposite bars differ.
 
@@ -378,7 +377,7 @@ def test_sdf_and_usd_stand_where_the_drawing_has_them():
     assert "translate = (1.041, 0.0375, 2.0)" in write_usd(scene, plane=on_a_base)
 
 
-@pytest.mark.parametrize("bar", [2, 4])
+@mark.parametrize("bar", [2, 4])
 def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
     """A kite folded onto one pin.
 

@@ -4,8 +4,7 @@ import cmath
 import sys
 from dataclasses import replace
 
-import pytest
-from pytest import approx
+from pytest import approx, fixture, mark
 
 from fourbar import Place, effects, solve, vary
 from fourbar.edit.dragging import list_handles
@@ -83,7 +82,7 @@ pole = "south"
 """
 
 
-@pytest.fixture
+@fixture
 def kind(monkeypatch, tmp_path):
     (tmp_path / "magnets.py").write_text(FILE, encoding="utf-8")
     monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
@@ -96,7 +95,7 @@ def kind(monkeypatch, tmp_path):
     del effects.Magnets
 
 
-@pytest.fixture
+@fixture
 def scene(kind):
     return loads(TEXT)
 
@@ -116,7 +115,7 @@ def test_it_is_read_and_written(scene):
     assert list_offers()["words"]["pole"] == ["north", "south"]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "old, new, line",
     read_rows(r"""
 bar = 4\nturns | bar = 3\nturns | magnets.bar = 3: must be 2 (in

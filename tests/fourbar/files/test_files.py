@@ -8,10 +8,9 @@ from dataclasses import replace
 from math import pi, tau
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Bar,
@@ -50,7 +49,7 @@ def facts(scene):
     return repr(parts), scene.title, scene.source
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+@mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_models_read_back_and_assemble_everywhere(path):
     scene = load(path)
     assert facts(loads(dump(scene))) == facts(scene)
@@ -88,7 +87,7 @@ RELEASED = st.builds(Free, st.floats(0.0, 1e300, exclude_min=True), STEPS)
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 
 
-@pytest.mark.slow
+@mark.slow
 @EXAMPLES
 @given(scenes(), st.none() | SWEPT | RELEASED, TEXT, TEXT)
 def test_any_scene_reads_back_bit_for_bit(scene, stated, title, source):
@@ -131,7 +130,7 @@ def test_what_a_file_cannot_hold_is_refused():
         dump(replace(scene, title="\ud800"))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "key, width, why",
     read_rows("""
 bars.input.inertia | 1e-6 | follows the length; state it
@@ -167,7 +166,7 @@ def test_a_stroke_is_less_than_the_spring_is_long():
             Spring(*ends, 10.0, 0.3, stroke=stroke)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "length, units, gravity",
     read_rows("""
 4 in | lb, in, lb in^2, lbf, lbf in | 9.806686

@@ -5,8 +5,7 @@ import time
 from contextlib import contextmanager
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, fixture, mark, raises
 
 from fourbar import dump, solve
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
@@ -157,7 +156,7 @@ ACROSS_LINES = [
 ]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "mistake",
     [*([cell.replace(r"\n", "\n") for cell in row] for row in MISTAKES), *ACROSS_LINES],
 )
@@ -172,7 +171,7 @@ def test_a_mistake_in_a_scene_file(mistake):
         assert word in line, line
 
 
-@pytest.fixture
+@fixture
 def refused(run, tmp_path):
     """A command is refused in one line with these words, and writes nothing."""
 
@@ -198,12 +197,12 @@ def test_a_huge_file_is_not_read(tmp_path, refused):
     refused(["analyze", huge], "100000000 bytes", str(LARGEST_SCENE_FILE))
 
 
-@pytest.mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
+@mark.parametrize("name", ["a\nb\x1b[31m.toml", "n" * 300])
 def test_hostile_names(name, refused):
     refused(["analyze", name])
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "arguments, words",
     read_rows("""
 mjcf | scene file or --lengths
@@ -231,7 +230,7 @@ NUMBERED = ["a{n}." + "a." * 98 + "a=1\n", "[a{n}]\nb=1\n", "[[a]]\nb={n}\n"]
 """Without a repeated key."""
 
 
-@pytest.mark.parametrize("pattern", slow_but(NONSENSE, NONSENSE + NUMBERED))
+@mark.parametrize("pattern", slow_but(NONSENSE, NONSENSE + NUMBERED))
 def test_large_nonsense_is_answered_soon(pattern):
     times = LARGEST_SCENE_FILE // len(pattern.format(n=100_000))
     text = "".join(pattern.format(n=n) for n in range(times))

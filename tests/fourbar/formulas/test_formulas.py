@@ -6,8 +6,7 @@ from math import pi, tau
 
 import mpmath as mp
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar.formulas.arithmetic import power_of_two
 from fourbar.formulas.many_digits import decide_half_angles, exact_half_angle
@@ -60,8 +59,8 @@ def hard_doubles(seed, count):
     return quadruples
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(600)
+@mark.slow
+@mark.timeout(600)
 def test_the_constants_of_the_loop_vanish_within_rounding_alone():
     """Squares in doubles may compare otherwise than exact ones beside a bound."""
     zeros, at_a_bound = [0, 0], 0
@@ -90,7 +89,7 @@ def test_the_constants_of_the_loop_vanish_within_rounding_alone():
     assert at_a_bound < 0.4 * QUADRUPLES
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, touches",
     read_rows("""
 # of a sum of 1.875, where d - a = b - c, those touch that miss by 7.5 U: 6 U and 10 U
@@ -149,7 +148,7 @@ def five(bars, psi):
     ]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
     """From the ground's direction to the opposite, and after many turns.
 
@@ -181,8 +180,8 @@ def test_the_half_angle_in_doubles_keeps_the_digits_of_the_angle():
                     )
 
 
-@pytest.mark.parametrize("bar", MOVING_BARS)
-@pytest.mark.parametrize("offset", [None, "1e-3"])
+@mark.parametrize("bar", MOVING_BARS)
+@mark.parametrize("offset", [None, "1e-3"])
 def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
     bars, theta = bare(*CRANK_ROCKER_LENGTHS, 0.4), np.linspace(0.1, 6.0, 7)
     path = prepare_path(bars.lengths, 0.4, bar)

@@ -4,7 +4,7 @@ import itertools
 from math import pi, radians, sin
 
 import numpy as np
-import pytest
+from pytest import mark, skip
 
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.mobility import turns_fully
@@ -28,13 +28,13 @@ CLOSED = 1e-14
 """Of the sum of the lengths: some twenty roundings of angles of several turns."""
 
 
-@pytest.mark.parametrize("bar", [2, 3, 4])
-@pytest.mark.parametrize("name, lengths", LINKAGES)
+@mark.parametrize("bar", [2, 3, 4])
+@mark.parametrize("name, lengths", LINKAGES)
 def test_an_assembly_goes_on_smoothly_through_change_points(name, lengths, bar):
     """Over three turns from the first quarter, between all change points."""
     linkage = bare(*map(float, lengths.split()), GROUND_ANGLE)
     if not turns_fully(linkage, bar):
-        pytest.skip("the bar has limits")
+        skip("the bar has limits")
     first = GROUND_ANGLE + (pi if bar == 4 else 0.0) + radians(45.7)
     turns = STEP * np.arange(round(3 * 2 * pi / STEP))
     for q, branch in itertools.product((first + turns, first - turns), (1, -1)):

@@ -5,8 +5,7 @@ from math import copysign, cos, pi, radians, sin, sqrt, tau
 
 import mpmath as mp
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -68,7 +67,7 @@ THESIS = bare(0.2, 0.48, 0.55, 0.2, radians(45.0))
 """The linkage of Linares Mendoza's thesis."""
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, barker, code, name",
     read_rows("""
 1 3 2.5 3.2 | 1 | GCCC | drag link
@@ -103,8 +102,8 @@ def test_barker_classes(stated, barker, code, name):
         assert {bar for bar in MOVING_BARS if turns_fully(bars, bar)} == turning
 
 
-@pytest.mark.parametrize("lengths", [*itertools.permutations((1.0, 2.0, 3.0, 6.0))])
-@pytest.mark.parametrize("theta_1", [0.3, -pi])
+@mark.parametrize("lengths", [*itertools.permutations((1.0, 2.0, 3.0, 6.0))])
+@mark.parametrize("theta_1", [0.3, -pi])
 def test_a_structure_stands_in_one_position(lengths, theta_1):
     bars = bare(*lengths, theta_1)
     assert classify(bars).code == "structure" and classify(bars).turning == ()
@@ -114,7 +113,7 @@ def test_a_structure_stands_in_one_position(lengths, theta_1):
     assert -pi < limit.theta_3 <= pi and -pi < limit.theta_4 <= pi
 
 
-@pytest.mark.parametrize("bars", random_linkages(1, 60))
+@mark.parametrize("bars", random_linkages(1, 60))
 def test_circuits_agree_with_a_scan(bars):
     """Positions are a graph.
 
@@ -149,7 +148,7 @@ def test_circuits_agree_with_a_scan(bars):
         assert len(set(partition)) == len(circuits(bars))
 
 
-@pytest.mark.parametrize("bar", MOVING_BARS)
+@mark.parametrize("bar", MOVING_BARS)
 def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
     """Against the law of cosines in 50 digits."""
     checked, (first, second) = 0, OTHERS[bar]
@@ -198,7 +197,7 @@ def test_a_central_crank_rocker_has_strokes_of_one_time_and_others_may_have_none
         assert time_ratio(without) is None
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, turns",
     read_rows("""
 2 1 2 1 | 0 1

@@ -6,8 +6,7 @@ What is exact or has no value near limits and change points is tested too.
 from math import copysign, pi
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
@@ -42,8 +41,8 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
     assert crossed.alpha(4)[[0, 2]] == approx([0.0, 0.0], abs=8 * EPS)
 
 
-@pytest.mark.parametrize("theta_1", [0.0, 0.4, -2.5])
-@pytest.mark.parametrize("branch", [1, -1])
+@mark.parametrize("theta_1", [0.0, 0.4, -2.5])
+@mark.parametrize("branch", [1, -1])
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1):
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
     line.

@@ -7,8 +7,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark, raises
 
 from fourbar import (
     Bar,
@@ -44,11 +43,11 @@ def test_written_into_given_arrays():
     for name, array in out.items():
         assert np.array_equal(array, solution[name])
     for wrong, words in (("torque", r"out\.torque"), ("T2", "T2")):
-        with pytest.raises(InputError, match=words):
+        with raises(InputError, match=words):
             solve(TURN, out={wrong: np.empty(24)})
 
 
-@pytest.mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
+@mark.parametrize("beside", [1e-3, 1e-6, 1e-9])
 def test_a_force_beside_B_has_its_moment_there(beside):
     """The output is driven, and bars 2 and 4 are free of moments.
 
@@ -65,8 +64,8 @@ def test_a_force_beside_B_has_its_moment_there(beside):
     assert np.hypot(*s.F32.T) == approx(exact, rel=GROWN)
 
 
-@pytest.mark.parametrize("ratio", [1e-5, 1e-3, 0.49, 0.51, 3.0, 1e3])
-@pytest.mark.parametrize("couple", [0.0, 0.4, 1e6])
+@mark.parametrize("ratio", [1e-5, 1e-3, 0.49, 0.51, 3.0, 1e3])
+@mark.parametrize("couple", [0.0, 0.4, 1e6])
 def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     """Each moment equation holds to a rounding of its own terms, however short bar 4.
 
@@ -87,12 +86,12 @@ def test_the_moments_of_bars_of_any_ratio_balance(ratio, couple):
     assert np.all(abs(of_4) <= 16.0 * EPS * (c * size + w.M4 + couple))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "pins",
     [("O2",), ("A",), ("B",), ("O4",), ("O2", "A", "B", "O4")],
     ids="-".join,
 )
-@pytest.mark.parametrize("drive_bar", [2, 3, 4])
+@mark.parametrize("drive_bar", [2, 3, 4])
 def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     pins, drive_bar
 ):

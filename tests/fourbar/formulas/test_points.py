@@ -9,8 +9,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     FourBar,
@@ -54,7 +53,7 @@ def random_positions(seed, count, least_sine=0.05):
     return positions
 
 
-@pytest.mark.parametrize("drawn", random_positions(12, 15))
+@mark.parametrize("drawn", random_positions(12, 15))
 def test_point_coefficients_are_derivatives(drawn):
     """Balls move the mass centre of the coupler, put at the point.
 
@@ -100,7 +99,7 @@ rhombus | 1 1 1 1
 """)
 
 
-@pytest.mark.parametrize("name, lengths", CURVES)
+@mark.parametrize("name, lengths", CURVES)
 def test_coupler_curves_are_closed_and_lie_on_the_sextic(name, lengths):
     """The coupler curve's own equation is free of theta_2.
 

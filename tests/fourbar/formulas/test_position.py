@@ -1,8 +1,7 @@
 """Directions and coefficients of every reading against circles in many digits."""
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import uniform
 from fourbar.formulas.motion import coefficients, take_sines_of_rates
@@ -21,7 +20,7 @@ DRIVEN = {2: (3, 4), 3: (2, 4), 4: (2, 3)}
 """The two bars whose sine a drive on a bar is divided by."""
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, psi, sign",
     read_rows("""
 # d, a, b, c, psi and the sign of the root: d - a = +-(b - c) exactly, so the diagonal
@@ -64,8 +63,8 @@ def test_digits_are_kept_where_the_diagonal_is_short(stated, psi, sign):
                 assert ours.imag == approx(of.imag, rel=4.0 * FEW_ROUNDINGS)
 
 
-@pytest.mark.parametrize("drive", [3, 4])
-@pytest.mark.parametrize("branch", [1, -1])
+@mark.parametrize("drive", [3, 4])
+@mark.parametrize("branch", [1, -1])
 def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(branch, drive):
     lengths = loop(2.0**-14, 1.5, 0.75, 1.25)
     half = half_angle(lengths, 0.7)

@@ -2,7 +2,7 @@
 
 import mpmath as mp
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar import (
     Bar,
@@ -29,8 +29,8 @@ ROUNDED_SUM = 2.0**-51
 """Of the sum of four lengths: what is missing of it where each is rounded by four U."""
 
 
-@pytest.mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
-@pytest.mark.parametrize("seed", [0, 1])
+@mark.parametrize("offset", [1e-2, 1e-8, 1e-14, 1e-30])
+@mark.parametrize("seed", [0, 1])
 def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
     """On one side of a limit the linkage assembles, with the torque of balls."""
     linkage = embody(draw_linkage(np.random.default_rng(seed)), BODIES[0])

@@ -8,8 +8,7 @@ from functools import partial
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import Gravity, Motion, Torsion, Viscous, solve
@@ -52,7 +51,7 @@ def test_the_pin_at_B_alone_closes_the_loop_from_outside():
     ]
 
 
-@pytest.mark.parametrize("reader", ["gazebo", "drake"])
+@mark.parametrize("reader", ["gazebo", "drake"])
 def test_an_sdf_stands_closed_at_B_and_its_joints_are_damped(reader):
     root = ElementTree.fromstring(write_sdf(released(), reader))
     places = {}
@@ -87,7 +86,7 @@ LOADED = crank_rocker(loads=(fourbar.Load(4, moment=1.0),))
 AT_B = (Viscous.at(B=1.0),)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "write, scene, words",
     [
         (
@@ -106,13 +105,11 @@ AT_B = (Viscous.at(B=1.0),)
     ],
 )
 def test_what_a_file_cannot_hold_is_refused(write, scene, words):
-    with pytest.raises(LimitError, match=words):
+    with raises(LimitError, match=words):
         write(scene)
 
 
-@pytest.mark.parametrize(
-    "write", [write_sdf, partial(write_sdf, reader="drake"), write_usd]
-)
+@mark.parametrize("write", [write_sdf, partial(write_sdf, reader="drake"), write_usd])
 def test_without_loads_a_file_says_so_and_how_to_start(write):
     scene = crank_rocker(motion=Motion(1.0, 3.0))
     text = write(scene, without_loads=True)

@@ -8,8 +8,7 @@ from math import dist, log10, pi, radians, sqrt, tau
 
 import mujoco
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Bar,
@@ -94,8 +93,8 @@ def opened(scene):
     return model, data
 
 
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize(
+@mark.parametrize("branch", [1, -1])
+@mark.parametrize(
     "lengths, points",
     read_rows("""
 0.3 0.1 0.3 0.1 | 0 1
@@ -135,7 +134,7 @@ def test_the_joints_count_the_turns_of_every_spring():
     assert abs(at_O4 - at_O2 - at_A - rests["B"]) < pi
 
 
-@pytest.mark.slow
+@mark.slow
 def test_opens_assembled_and_moves_without_keyframe_or_control():
     rng = np.random.default_rng(SEED)
     # the joints start where these put them, far from the angles' first turn
@@ -172,8 +171,8 @@ RELEASE = 1e-4
 """rad, of a free motion of half a second at the file's own timestep; measured 1e-6."""
 
 
-@pytest.mark.parametrize("scale", slow_but({0.01}, [1.0, 0.01]))
-@pytest.mark.slow
+@mark.parametrize("scale", slow_but({0.01}, [1.0, 0.01]))
+@mark.slow
 def test_a_released_linkage_falls_by_itself(scale):
     bars = [
         Bar(scale * length, mass)
@@ -194,7 +193,7 @@ def test_a_released_linkage_falls_by_itself(scale):
         )
 
 
-@pytest.mark.parametrize("mass, inertia", [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
+@mark.parametrize("mass, inertia", [(0.0, None), (1e-16, 1.0), (1.0, 1e-16)])
 def test_massless_bar_is_refused_in_one_line(mass, inertia):
     linkage = FourBar(
         0.3,

@@ -11,9 +11,8 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 import pandas
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx
+from pytest import approx, mark, raises
 
 from fourbar import (
     Flywheel,
@@ -434,7 +433,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("name", FILES)
+@mark.parametrize("name", FILES)
 def test_every_sentence_holds(name):
     said = Opened(*FILES[name]).comments()
     assert len(said) >= 6 and all(len(line) <= 115 for line in said)
@@ -461,5 +460,5 @@ def test_every_sentence_of_the_table_is_said_somewhere():
 
 def test_a_motor_for_one_that_takes_none_is_refused():
     for wrong in (("newton", "motor"), ("mujoco", "servo"), ("ode",)):
-        with pytest.raises(InputError, match=r"^[^\n]+$"):
+        with raises(InputError, match=r"^[^\n]+$"):
             write_mjcf_for(crank_rocker(), *wrong)

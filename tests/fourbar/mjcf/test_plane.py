@@ -7,8 +7,7 @@ import re
 
 import mujoco
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark, raises
 
 from fourbar import InputError, load
 from fourbar.mjcf import Plane, assembly, write_mjcf
@@ -22,7 +21,7 @@ ORIGIN = (1.0, -2.0, 0.5)
 SCENE = load(MODELS / "crank_rocker.toml")
 
 
-@pytest.mark.parametrize("axis", AXES)
+@mark.parametrize("axis", AXES)
 def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     plane = Plane(axis)
     turn = plane.rotation
@@ -43,7 +42,7 @@ def test_the_frame_turns_z_to_the_axis_by_the_shortest_way(axis):
     assert np.allclose(rotation(half), turn @ about_z, atol=1e-15)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "axis, at, expected",
     read_rows("""
 # x-z, gravity down
@@ -61,13 +60,13 @@ def test_a_turned_vector_has_zeros_where_it_has_no_component(axis, at, expected)
     assert np.linalg.norm(plane.quaternion) == approx(1.0, abs=1e-15)
 
 
-@pytest.mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
+@mark.parametrize("axis", [(0.0, 0.0, 0.0), (1.0, 2.0), (1.0, 0.0, np.nan), "z"])
 def test_what_is_no_direction_is_refused(axis):
-    with pytest.raises(InputError, match="axis"):
+    with raises(InputError, match="axis"):
         Plane(axis)
 
 
-@pytest.mark.parametrize("axis", AXES)
+@mark.parametrize("axis", AXES)
 def test_mujoco_moves_and_loads_a_tilted_linkage_alike(axis):
     plane = Plane(axis, ORIGIN)
     answers = []
@@ -108,7 +107,7 @@ def test_only_a_plane_that_is_tilted_is_called_so():
         assert place == (name != "level")
 
 
-@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
+@mark.parametrize("axis", [(0.0, 0.0, 1.0), *AXES])
 def test_the_joints_of_a_usd_meet_wherever_the_plane_is(axis):
     plane = Plane(axis, ORIGIN)
     text = assembly.write_usd(SCENE, without_loads=True, plane=plane)

@@ -8,8 +8,7 @@ import re
 from fractions import Fraction
 
 import numpy as np
-import pytest
-from pytest import raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import InputError, Load, Motion, Place, Spring, Sweep
@@ -70,12 +69,12 @@ SAME = [
 ]
 
 
-@pytest.mark.parametrize("make, texts, numbers", SAME)
+@mark.parametrize("make, texts, numbers", SAME)
 def test_a_text_with_a_unit_is_its_number(make, texts, numbers):
     assert make(*texts) == make(*numbers)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, stated, words",
     read_rows(r"""
 uniform | ["6", 1, 1, 1] | lengths.ground = '6': the unit is missing.*like \"1 m\"
@@ -158,7 +157,7 @@ POWERS = {
 PREFIXES = {name: power for names, power in POWERS.items() for name in names.split()}
 
 
-@pytest.mark.parametrize("name, unit, exact", UNITS)
+@mark.parametrize("name, unit, exact", UNITS)
 def test_every_unit_is_its_fraction(name, unit, exact):
     assert to_si(f"1 {name}", unit) == float(exact)
     assert to_si(f"0.7 {name}", unit) == float(exact * Fraction(7, 10))
@@ -203,7 +202,7 @@ CONVERTED = read_rows("""
 """A foot is 0.3048 m."""
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, unit, value",
     [
         *CONVERTED,
@@ -251,7 +250,7 @@ inf m
 """.splitlines()
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, unit",
     [
         *((text, "rad/s") for text in ("1 Hz", "1 1/s", "1 s^-1", "1 rad", "1 deg")),
@@ -264,7 +263,7 @@ def test_what_is_no_number_of_the_dimension_is_refused(text, unit):
         to_si(text, unit)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, unit, meant",
     read_rows("""
 5 lb | N | 5 lbf
@@ -283,7 +282,7 @@ def test_a_force_is_not_taken_for_a_length():
         to_si("5 lb", "m")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, half",
     read_rows("""
 0.10 m | 5e-3
@@ -296,15 +295,15 @@ def test_a_force_is_not_taken_for_a_length():
 """),
 )
 def test_half_a_unit_of_the_last_decimal(text, half):
-    assert half_unit_of_text(text, "m") == pytest.approx(float(half), rel=1e-15)
+    assert half_unit_of_text(text, "m") == approx(float(half), rel=1e-15)
 
 
-@pytest.mark.parametrize("prefix", PREFIXES)
+@mark.parametrize("prefix", PREFIXES)
 def test_every_prefix_is_its_power_of_ten(prefix):
     assert to_si(f"3 {prefix}N", "N") == float(3 * Fraction(10) ** PREFIXES[prefix])
 
 
-@pytest.mark.parametrize("text", ["84 rad/s cw", "5 rpm CCW", "-5 rpm clockwise"])
+@mark.parametrize("text", ["84 rad/s cw", "5 rpm CCW", "-5 rpm clockwise"])
 def test_a_sense_of_turning_is_a_sign(text):
     with raises(UnitError, match="counter-clockwise is positive"):
         to_si(text, "rad/s")

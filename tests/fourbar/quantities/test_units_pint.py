@@ -6,14 +6,13 @@ Every place that takes a text with a unit takes them.
 import math
 
 import numpy as np
-import pytest
 from numpy.testing import assert_array_equal
-from pytest import raises
+from pytest import importorskip, mark, raises
 
 from fourbar import Bar, FourBar, InputError, Motion
 from fourbar.quantities.units import PARSED_UNITS, ask_library
 
-ureg = pytest.importorskip("pint").UnitRegistry()
+ureg = importorskip("pint").UnitRegistry()
 MM, DEG = ureg.millimeter, ureg.degree
 
 
@@ -32,7 +31,7 @@ def test_arrays_of_angles_are_converted():
     assert motion.omega_2 == 2.0 * math.pi
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "quantity, sentence",
     [
         (3.0 * ureg.second, "does not convert to m"),
@@ -51,7 +50,7 @@ def test_hertz_are_no_speed():
         Motion(0.0, 10.0 * ureg.hertz)
 
 
-@pytest.mark.parametrize("unit", PARSED_UNITS)
+@mark.parametrize("unit", PARSED_UNITS)
 def test_a_common_unit_is_what_the_library_makes_of_it(unit):
     number, dimension = ask_library(unit)
     # which power comes first hangs on what the library has read before

@@ -2,8 +2,7 @@
 
 import math
 
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import DrawnPins
 
@@ -16,7 +15,7 @@ def test_a_place_goes_into_a_bar_and_back():
         assert DRAWING.from_bar(bar, z) == approx(3.0 + 0.5j)
 
 
-@pytest.mark.parametrize("turn", [-3.1, -1.0, 0.4, 2.0, 3.1])
+@mark.parametrize("turn", [-3.1, -1.0, 0.4, 2.0, 3.1])
 def test_theta_2_is_within_half_a_turn_of_the_ground(turn):
     for angle in (-3.0, -1.0, 0.1, 3.0):
         O4, A, B = (

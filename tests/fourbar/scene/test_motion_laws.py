@@ -4,9 +4,8 @@ import json
 from math import degrees, pi, sin, sqrt, tau
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import Gravity, InputError, Scene, solve, uniform
@@ -52,8 +51,8 @@ def test_a_sine_is_followed_to_all_digits():
     assert s.theta_2[100] == approx(1.0 + sin(0.5 * s.time[100]))
 
 
-@pytest.mark.parametrize("bar", MOVING_BARS)
-@pytest.mark.parametrize("rates", [0, 1, 2])
+@mark.parametrize("bar", MOVING_BARS)
+@mark.parametrize("rates", [0, 1, 2])
 def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     """Speeds make each piece a cubic, accelerations beside them a quintic.
 
@@ -94,7 +93,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("name", LAWS)
+@mark.parametrize("name", LAWS)
 def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
     """Pieces join without a jump.
 
@@ -121,7 +120,7 @@ def test_rates_are_the_slopes_of_a_law_that_passes_its_points(name):
     assert np.abs(np.diff(sides, axis=0)).max(initial=0.0) < 1e-5
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "kind, speed, acceleration",
     [("cycloidal", 2.0, 2.0 * pi), ("345", 1.875, 10.0 / sqrt(3.0))],
 )
@@ -136,7 +135,7 @@ def test_a_cam_has_the_factors_of_the_books(kind, speed, acceleration):
     assert np.abs(alpha).max() * 0.25 == approx(acceleration, rel=1e-8)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "kind, stated, key",
     read_rows("""
 Rise | {"kind": "harmonic", "rise": [1, 0.5], "theta_2": 0} | motion.law.kind
@@ -157,7 +156,7 @@ def test_a_law_that_cannot_be_names_its_key(kind, stated, key):
 TABLE = 'time = ["0 s", "1 s"], theta_2 = ["0 deg", "60 deg"], '
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "law, words",
     [
         *(
@@ -185,7 +184,7 @@ def test_a_law_that_states_too_much_or_too_little_is_refused(law, words):
         make_swing(f"{{ {law} }}")
 
 
-@pytest.mark.parametrize("ends, other", [("free", "rest"), ("rest", "free")])
+@mark.parametrize("ends, other", [("free", "rest"), ("rest", "free")])
 def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     """The change is that of the two laws on a dense grid of the end intervals."""
     times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)

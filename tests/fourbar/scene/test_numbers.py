@@ -7,9 +7,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import raises
+from pytest import mark, raises
 
 from fourbar import InputError, Point, solve, vary
 from fourbar.files import dump, loads
@@ -57,7 +56,7 @@ P = { bar = 5, from_pin = ["1 m", "0 deg"] } | 1 (ground)
 """)
 
 
-@pytest.mark.parametrize("line, words", WRONG)
+@mark.parametrize("line, words", WRONG)
 def test_a_wrong_point_is_refused_in_one_line(line, words):
     with refused("points", words):
         loads(dump(scene()) + f"\n[points]\n{line}\n")

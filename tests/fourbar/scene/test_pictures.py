@@ -6,8 +6,7 @@ Kept by it, shown by the page, and no path out of the scene's folder.
 import base64
 from dataclasses import replace
 
-import pytest
-from pytest import raises
+from pytest import approx, mark, raises
 
 from fourbar import InputError, solve
 from fourbar.files import dump, load, loads, save
@@ -57,7 +56,7 @@ def test_one_given_with_the_command_takes_its_place(tmp_path):
     assert base64.b64decode(shown.partition(",")[2]) == PNG + b"x"
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name",
     [
         *r"""
@@ -132,7 +131,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
     scene = load(file)
     picture = scene.picture
     assert (picture.origin, picture.scale) == ((120.0, 80.5), 5e-4)
-    assert (picture.angle, picture.opacity) == (pytest.approx(-0.0523598776), 0.25)
+    assert (picture.angle, picture.opacity) == (approx(-0.0523598776), 0.25)
     assert loads(dump(scene), str(file)).picture == picture
     show("analyze", file, "-o", "a.csv")
     file.write_text(LENGTHS + '[picture]\nfile = "photo.jpg"\n')
@@ -144,7 +143,7 @@ def test_the_picture_under_the_drawing_is_read_and_written_and_need_not_be_there
         save(scene, tmp_path / "inner" / "scene.toml")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, words",
     read_rows(r"""
 file = "../photo.jpg" | picture.file .*next to the scene file
@@ -161,7 +160,7 @@ def test_a_wrong_entry_of_the_picture_is_refused(stated, words):
         loads(f"{LENGTHS}[picture]\n{stated}\n".replace(r"\n", "\n"))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "content, kind",
     [
         (PNG, "image/png"),

@@ -7,8 +7,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -53,7 +52,7 @@ def sine(solution, bar):
     return np.asarray(np.sin(second - first))
 
 
-@pytest.mark.parametrize("bar", MOVING_BARS)
+@mark.parametrize("bar", MOVING_BARS)
 def test_limits_of_a_bar_are_where_its_own_sine_is_zero(bar):
     rocker = FourBar(0.5, Bar(0.4), Bar(0.3), Bar(0.25), 0.2)
 
@@ -80,7 +79,7 @@ def test_a_bar_without_limits_has_no_position_from_one():
         solve(crank)
 
 
-@pytest.mark.parametrize("bar", [3, 4])
+@mark.parametrize("bar", [3, 4])
 def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
     theta, omega, alpha = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
     swept = solve(replace(LOADED, motion=Motion(**{omega: 2.0})))
@@ -102,7 +101,7 @@ def test_a_sweep_a_law_and_what_is_left_out_follow_the_commanded_bar(bar):
         Motion(law=law, free=Free(1.0, 2))
 
 
-@pytest.mark.parametrize("bar", slow_but({3}, [3, 4]))
+@mark.parametrize("bar", slow_but({3}, [3, 4]))
 def test_released_at_an_angle_of_another_bar_it_moves_as_at_its_own_theta_2(bar):
     free = Free(0.4, 8)
     scene = replace(LOADED, effects=(*LOADED.effects, Viscous.at(O2=0.01)), loads=())
@@ -131,7 +130,7 @@ RATES = {"stroke": 0.3, "stroke_speed": 0.1, "side": "left", "branch": -1}
 STROKE = Motion(stroke_acceleration=0.2, **RATES)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, changes, same",
     [
         (
@@ -165,7 +164,7 @@ def test_a_motion_reads_by_the_name_of_what_it_commands():
     assert others == (None, None, 0.0, None)
 
 
-@pytest.mark.parametrize("bar", [2, 3, 4])
+@mark.parametrize("bar", [2, 3, 4])
 def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
     five = replace(LOADED, motion=Motion(np.linspace(0.5, 1.5, 5)))
     angles = tuple(solve(five, "position")[f"theta_{bar}"])
@@ -186,7 +185,7 @@ def test_angles_with_rates_of_their_own_are_the_positions_of_a_law(bar):
         command_at(of_each, np.array([0.123]))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, said",
     read_rows("""
 {"theta_2": [1, 2], "omega_2": [1]} | one for each listed position: 2
@@ -208,7 +207,7 @@ def test_rates_that_belong_to_no_angle_are_refused(motion, said):
         Motion(**json.loads(motion))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "lines, said",
     read_rows(r"""
 theta_2 = "1 rad"\ntheta_4 = "1 rad" | motion.theta_4 = 1.0: must be left out

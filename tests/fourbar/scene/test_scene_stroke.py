@@ -6,8 +6,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -66,9 +65,7 @@ def test_strokes_with_rates_of_their_own_are_each_alone():
         assert of_each.F14[row] == approx(alone.F14[0], rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    "bar, strokes", [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])]
-)
+@mark.parametrize("bar, strokes", [(2, [0.181, 0.4, 0.4199999]), (4, [0.4, 0.45, 0.5])])
 def test_error_bars_hold_what_the_angle_of_a_stroke_loses(bar, strokes):
     """The ground turned with all that is on it.
 
@@ -103,7 +100,7 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
     assert np.isnan(s.omega_3[0]) and s.condition[0] < 1e-7
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, says",
     read_rows("""
 {"stroke": 0.9, "side": "left"} | 0.18 to 0.42 m
@@ -129,7 +126,7 @@ def test_who_does_not_take_it_says_so():
     assert replace(by_stroke, title="b") != by_stroke
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "keywords, words",
     [
         ({"theta_2": Sweep("10 cm", "20 cm", 4)}, "motion.theta_2"),

@@ -4,7 +4,7 @@ import json
 import re
 from math import acos, asin, cos, degrees, pi, radians, sin, sqrt, tan, tau
 
-import pytest
+from pytest import mark
 
 from fourbar import (
     Flywheel,
@@ -171,13 +171,13 @@ TOLD = [
 """Scene files, and what their block tells; "!" before what it does not."""
 
 
-@pytest.mark.parametrize("text, said", TOLD)
+@mark.parametrize("text, said", TOLD)
 def test_where_springs_are_beyond_their_stroke_and_places_are_taken_is_told(text, said):
     told = read_block(solve(loads(text)))
     assert (said.removeprefix("!") in told) == (said[0] != "!"), told
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_form_of_what_is_printed_tells_it(tmp_path, show):
     """Of an equilibrium the place is that of the input."""
     file = tmp_path / "hatch.toml"
@@ -215,7 +215,7 @@ drawn | 530 deg |
 """)
 
 
-@pytest.mark.parametrize("start, stop, told", LONG_WAYS)
+@mark.parametrize("start, stop, told", LONG_WAYS)
 def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
     """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
     text = DRAWN.replace("FROM", start).replace("TO", stop)
@@ -229,7 +229,7 @@ MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
 ENDS = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
 
 
-@pytest.mark.parametrize("start, stop", [(2.0, 2.0 + tau), (8.0, 2.0)])
+@mark.parametrize("start, stop", [(2.0, 2.0 + tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
     length = sqrt(0.1 - 0.06 * cos(pi - 0.2))
@@ -242,7 +242,7 @@ def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     assert f"pulls from {places[0]} to {places[1]} and" in note
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_spring_pulls_in_a_release_from_between_its_instants():
     """The crank swings about the rest of a spring at O2: theta = 1 - cos(w t)/2."""
     length = sqrt(0.1 - 0.06 * cos(1.1))  # at 1.1 rad

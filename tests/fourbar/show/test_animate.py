@@ -16,9 +16,8 @@ from itertools import pairwise
 from math import degrees, nan, pi, radians
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_equal
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     DependencyError,
@@ -71,7 +70,7 @@ def embedded(page):
     return json.loads(Tags(page).scripts[0])
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_is_solved_already_changes_no_number():
     turn, backwards = Sweep(0.0, 2.0 * pi, 12), Sweep(3.0, 1.0, 12)
     for angles in (turn, backwards, 1.0):
@@ -108,7 +107,7 @@ antiparallelogram | 18 | alpha_3
 """A model, a row of its sweep and what has a number there that is rounding alone."""
 
 
-@pytest.mark.parametrize("model, row, name", ROUNDING)
+@mark.parametrize("model, row, name", ROUNDING)
 def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
     scene = load(MODELS / f"capabilities/{model}.toml")
     columns = animate.collect_live_data(scene)["branches"][str(scene.motion.branch)]
@@ -128,7 +127,7 @@ def test_a_released_motion_has_an_energy_and_no_torque():
     assert columns["energy"][0] == 0.0 < columns["energy"][1]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "duration, rate",
     [(0.2, 0.1), (1.4e-3, 1e-4), (30.0, 1.0), (6e3, 100.0), (6.1e3, 1e3)],
 )
@@ -169,7 +168,7 @@ def test_nothing_is_fetched_and_hostile_text_stays_text():
     assert f"'sha256-{digest}'" in policy  # its own script and nothing else
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "bar, content, message",
     [
         ("input", b"", "PNG or JPEG"),
@@ -186,7 +185,7 @@ def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
     assert not (tmp_path / "page.html").exists()
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, options, words",
     [
         ("a.avi", {}, r"\.html, \.gif, \.mp4"),
@@ -203,8 +202,8 @@ def test_what_cannot_be_shown_is_refused(name, options, words, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene, frames", [(crank_rocker(), 5), (RELEASED, 9)])
+@mark.slow
+@mark.parametrize("scene, frames", [(crank_rocker(), 5), (RELEASED, 9)])
 def test_a_gif_moves_the_linkage(scene, frames, tmp_path, monkeypatch):
     """A release of 1.8 s runs forward and as long as it does."""
     from PIL import Image
@@ -231,8 +230,8 @@ def test_a_gif_moves_the_linkage(scene, frames, tmp_path, monkeypatch):
     assert np.mean(away > 64) < 1e-3
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(
+@mark.slow
+@mark.skipif(
     shutil.which("ffmpeg") is None and find_spec("imageio_ffmpeg") is None,
     reason="neither ffmpeg nor imageio-ffmpeg",
 )
@@ -251,7 +250,7 @@ def test_without_ffmpeg_an_mp4_is_refused_in_one_line(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_frame_has_the_linkage_at_its_position_and_nothing_of_another():
     with style.apply_style():
         shown = view.make_view(crank_rocker())

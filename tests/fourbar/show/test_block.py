@@ -6,8 +6,7 @@ from dataclasses import replace
 from math import degrees, floor, log10, pi, radians, sqrt, tau
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import (
     Bar,
@@ -438,7 +437,7 @@ QUICK = {*FILES, *SAID} - {
 }
 
 
-@pytest.mark.parametrize("name", slow_but(QUICK, [*FILES, *SAID]))
+@mark.parametrize("name", slow_but(QUICK, [*FILES, *SAID]))
 def test_the_block_says(name):
     if name in SAID:
         scene, said, unsaid = SAID[name]
@@ -502,7 +501,7 @@ def test_the_rates_are_the_largest_of_the_bars_that_follow():
         assert f"{name} {first:.4g} {unit} {second:.4g} {unit} at" in text
 
 
-@pytest.mark.parametrize("steps", [1, 6])
+@mark.parametrize("steps", [1, 6])
 def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(steps):
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = Motion(Sweep(0.2, 1.4, steps) if steps > 1 else 0.2, 0.0)
@@ -520,8 +519,8 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     assert said in block(held)
 
 
-@pytest.mark.parametrize("alpha", [30.0, -0.1])
-@pytest.mark.parametrize("angle", [0.2, [0.2, 1.4]])
+@mark.parametrize("alpha", [30.0, -0.1])
+@mark.parametrize("angle", [0.2, [0.2, 1.4]])
 def test_a_start_from_rest_works_against_the_whole_of_dry_friction(alpha, angle):
     """Nothing holds it there: 0.2 N m at O2 act against the acceleration."""
     still = Motion(angle, 0.0 * np.array(angle), np.full_like(angle, alpha))
@@ -538,7 +537,7 @@ def test_a_start_from_rest_works_against_the_whole_of_dry_friction(alpha, angle)
     assert "to start" in text and "holds" not in text
 
 
-@pytest.mark.slow
+@mark.slow
 def test_each_position_at_rest_has_its_own_range():
     """Pin B stands against the coupler at 0 and 180 deg, pin O4 between positions.
 
@@ -615,7 +614,7 @@ SPIKE = Load(2, moment=-1.0, table=Table(CORNERS, (1.0, 1.0, 50.0, 1.0, 1.0)))
 """A couple on the crank that is largest between two positions."""
 
 
-@pytest.mark.parametrize("senses, alpha", [((-1, 1), 0.0), ((-1,), -1.0), ((1,), 1.0)])
+@mark.parametrize("senses, alpha", [((-1, 1), 0.0), ((-1,), -1.0), ((1,), 1.0)])
 def test_a_bore_at_rest_moves_the_linkage_against_its_friction(senses, alpha):
     """An acceleration says which way it starts."""
     motion = Motion(Sweep(1.0, 2.6, 8), 0.0, alpha)
@@ -645,7 +644,7 @@ def test_a_bore_pushes_and_pulls_the_most_of_a_motion():
         assert re.search(rf"{bore:.4g} mm\b[^;]* to {does} {most:.4g} N", text)
 
 
-@pytest.mark.parametrize("angle", (Sweep(1.0, 2.6, 8), 1.7))
+@mark.parametrize("angle", (Sweep(1.0, 2.6, 8), 1.7))
 def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     """The peaks of the motion either way, slow enough for its inertia not to show."""
     effects = (*WEIGHT, PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
@@ -683,8 +682,8 @@ def test_a_torque_that_friction_just_holds_is_zero_within_rounding():
     assert "at rest 0 mN m to 600 mN m" in block(scene)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("bar", (2, 3))
+@mark.slow
+@mark.parametrize("bar", (2, 3))
 def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     """The ends lie as far from O2, or the ground's end is on the path of the other,
     which passes it at theta_2 = 40 deg.
@@ -702,7 +701,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     assert bar == 3 or high == approx(0.2, rel=1e-12)
 
 
-@pytest.mark.parametrize("number", [0, 1])
+@mark.parametrize("number", [0, 1])
 def test_a_cylinder_assembles_over_the_range_that_its_bar_is_in(number):
     """The rocker has two ranges, which the crank's line mirrors."""
     low, high = find_intervals(MASSLESS, 4)[number]
@@ -718,7 +717,7 @@ def test_a_cylinder_assembles_over_the_range_that_its_bar_is_in(number):
         assert Facts(sweep(start, 3)).stroke_limits == ends
 
 
-@pytest.mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
+@mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
 def test_digits_left_are_those_that_the_error_bar_leaves(away):
     """A torque on bar 4 beside its dead centre, where bars 2 and 3 are in line."""
     stretched = find_angle(0.22, 0.3, 0.35)
@@ -753,7 +752,7 @@ def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign():
     assert write_cells(beside_a_pole)[0] == "10"
 
 
-@pytest.mark.parametrize("name, branch", (("open", 1), ("crossed", -1)))
+@mark.parametrize("name, branch", (("open", 1), ("crossed", -1)))
 def test_equilibria_are_named_as_a_scene_states_their_assembly(name, branch):
     """On either side of a change point, where the sine of mu has another sign."""
     scene = move(PARALLELOGRAM, WEIGHT, branch=branch)

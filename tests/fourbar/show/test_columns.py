@@ -4,8 +4,7 @@ from dataclasses import replace
 from math import remainder, tau
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Gravity,
@@ -70,7 +69,7 @@ F34_y | is the reaction of F43_y: minus it
 """)
 
 
-@pytest.mark.parametrize("name, says", UNKNOWN)
+@mark.parametrize("name, says", UNKNOWN)
 def test_an_unknown_column_is_refused_with_those_there_are(name, says):
     with raises(InputError, match=says):
         columns(TURN, name)
@@ -132,7 +131,7 @@ ROUND_OFF = 1e-13
 """
 
 
-@pytest.mark.parametrize("speed", [TURN.motion.speed, None])
+@mark.parametrize("speed", [TURN.motion.speed, None])
 def test_ratios_and_centres_are_those_of_the_formulas(speed):
     """From the pins and from the half-angle formulas."""
     scene = recommand(TURN, speed=speed)

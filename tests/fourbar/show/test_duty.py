@@ -6,8 +6,7 @@ The loads of the pins are tested too.
 from math import copysign, radians, sin, tau
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -45,7 +44,7 @@ INTEGRATED = 1e-9
 """Relative: the rule is exact on periods, and panels settle to that."""
 
 
-@pytest.mark.parametrize("drive", [None, CYLINDER], ids=("couple", "cylinder"))
+@mark.parametrize("drive", [None, CYLINDER], ids=("couple", "cylinder"))
 def test_shaking_is_the_momentum_that_the_bars_lose(drive):
     s = solve(crank_rocker(loads=(), effects=(), drive=drive))
     force = 0.0
@@ -71,7 +70,7 @@ WITHIN = {
 }
 
 
-@pytest.mark.parametrize("within", WITHIN.values(), ids=WITHIN)
+@mark.parametrize("within", WITHIN.values(), ids=WITHIN)
 def test_what_acts_within_a_linkage_at_rest_leaves_its_weight_on_the_frame(within):
     motion = Motion(np.linspace(0.3, 1.2, 4), 0.0)
     s = solve(crank_rocker(loads=(), motion=motion, **within))
@@ -88,7 +87,7 @@ def test_what_acts_within_a_linkage_at_rest_leaves_its_weight_on_the_frame(withi
     assert np.diff(shaking_force(study)[:, 0, 1]) == approx([-9.81])
 
 
-@pytest.mark.parametrize("second", [1.2, -1.2])
+@mark.parametrize("second", [1.2, -1.2])
 def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second):
     """The bar that goes back at first turns forwards in the end."""
     law = Law((0.0, 0.2, 0.5, 1.0), (0.1, second, 3.7, 0.1 + tau), ends="periodic")
@@ -103,8 +102,8 @@ def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second):
     assert duty.mean_torque * tau == approx(work, abs=ROUND_OFF * duty.energy_in)
 
 
-@pytest.mark.parametrize("speed", [10.0, -10.0])
-@pytest.mark.parametrize("start, stop", [(0.3, 0.3 + tau), (2.0, 0.3), (0.3, 2.0)])
+@mark.parametrize("speed", [10.0, -10.0])
+@mark.parametrize("start, stop", [(0.3, 0.3 + tau), (2.0, 0.3), (0.3, 2.0)])
 def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, speed):
     """T = m g a cos(theta_2) and a constant couple.
 
@@ -145,7 +144,7 @@ def test_the_json_holds_the_duty():
         assert printed * unit == approx(number, rel=ROUND_OFF)
 
 
-@pytest.mark.parametrize("stop", [0.1 + tau, 2.5])
+@mark.parametrize("stop", [0.1 + tau, 2.5])
 def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
     """Nothing stands between them; equal ends of a turn count once in a mean."""
     s = solve(crank_rocker(motion=Motion(np.linspace(0.1, stop, 61), 10.0)))
@@ -163,7 +162,7 @@ def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
 def test_a_study_has_shaking_and_its_members_a_duty():
     study = solve(vary(crank_rocker(), {"bars.input.mass": [0.2, 0.3]}))
     for ask in (motor_duty, lambda solution: bearing_load(solution, "A")):
-        with pytest.raises(fourbar.InputError, match="members of a study one by one"):
+        with raises(fourbar.InputError, match="members of a study one by one"):
             ask(study)
 
 
@@ -177,7 +176,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
     assert heading.split(",").count("time") == 1 and len(rows) == 2 * 21
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = Torsion.at(A=(2.0, radians(86.0), 0.0))

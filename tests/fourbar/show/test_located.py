@@ -4,8 +4,7 @@ from dataclasses import replace
 from math import acos, asin, pi, radians, sin, sqrt, tau
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Free,
@@ -73,7 +72,7 @@ def parallelogram(motion=SWEEP):
     return loads(PARALLELOGRAM.format(motion=motion))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion",
     [
         SWEEP,
@@ -81,7 +80,7 @@ def parallelogram(motion=SWEEP):
         '{ from = "180 deg", to = "0 deg", steps = 7 }',
     ],
 )
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, value, places",
     [
         ("B_x", "0.855 m", [acos(0.11)]),
@@ -113,7 +112,7 @@ transmission | max | 90
 """Columns, their values, and the angle of the input, deg."""
 
 
-@pytest.mark.parametrize("name, value, place", EXTREMES)
+@mark.parametrize("name, value, place", EXTREMES)
 def test_the_least_and_the_greatest_value_are_located(name, value, place):
     """Between the steps by sines, and at the end of what grows all the way.
 
@@ -163,7 +162,7 @@ def test_a_law_has_a_value_at_times_and_none_while_it_dwells():
         locate(scene, "B_x", "0.8 m")
 
 
-@pytest.mark.parametrize("omega", [0.5, -0.5])
+@mark.parametrize("omega", [0.5, -0.5])
 def test_a_steady_sweep_has_a_place_at_each_time(omega):
     """A backward sweep begins at its other end, as its column of times has it."""
     scene = crank_rocker(motion=Motion(Sweep(0.2, 1.2, 10), omega))
@@ -200,7 +199,7 @@ def test_a_knot_of_a_law_is_one_place():
     assert found.time == approx([0.1], abs=LOCATED)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_release_is_met_when_it_first_passes():
     """By a much finer release: the angle lies between two of its instants."""
     free = DROPPED.motion.replace(free=Free(1.0, 20000))
@@ -219,7 +218,7 @@ def test_a_release_is_met_when_it_first_passes():
     assert state.omega_2[1] == approx(fine.omega_2[first], rel=1e-3)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_release_has_a_value_at_times():
     """A parallelogram of massless cranks swings its coupler as a point mass on one.
 
@@ -264,14 +263,14 @@ B_x-theta_2 | 1 m | difference is of two columns of one kind
 """)
 
 
-@pytest.mark.parametrize("name, value, words", REFUSED)
+@mark.parametrize("name, value, words", REFUSED)
 def test_what_no_position_has_is_refused_with_the_range(name, value, words):
     kind = NotAssembledError if "constant" in words or "no pos" in words else InputError
     with raises(kind, match=words):
         locate(parallelogram(), name, value)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_column_that_jumps_over_a_value_does_not_have_it():
     """Dry friction alone: the torque is 2 N m up to 1 s and -2 N m from there."""
     scene = loads(
@@ -282,7 +281,7 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
         locate(scene, "torque", "0.5 N m")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_column_with_poles_says_that_it_grows_without_bound():
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
     scene = crank_rocker(motion=Motion())

@@ -8,9 +8,8 @@ from dataclasses import replace
 from html import unescape
 
 import numpy as np
-import pytest
 from numpy.testing import assert_array_equal
-from pytest import raises
+from pytest import approx, importorskip, mark, raises
 
 from fourbar import (
     DependencyError,
@@ -31,7 +30,7 @@ LOOSE = crank_rocker(tolerances=(Tolerance("lengths.input", 1e-4),))
 STUDY = vary(LOOSE, {"lengths.input": np.array([0.1, 0.11, 3.0])})
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_scene_shows_itself():
     shown = thesis()._repr_html_()
     picture = shown.partition("data:image/svg+xml;base64,")[2].partition('"')[0]
@@ -65,7 +64,7 @@ def test_without_pandas_one_line_says_what_to_install(monkeypatch):
         solve(thesis()).to_pandas()
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "result",
     [
         lambda: solve(LOOSE),
@@ -118,7 +117,7 @@ def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
 
 
 def test_sensitivities_and_tolerances_as_pandas_and_by_one_set_of_names():
-    pytest.importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
+    importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
     slopes = sensitivity(LOOSE)
     spread = tolerances(LOOSE, 64)
     table = slopes.to_pandas()
@@ -137,7 +136,7 @@ def test_the_slope_of_a_size_is_its_difference():
     slope = (ahead - back) / (2.0 * step)
     slopes = sensitivity(LOOSE)
     close = 1e-6 * np.abs(slope).max()
-    assert slopes.of("|F12|", "lengths.input") == pytest.approx(slope, abs=close)
+    assert slopes.of("|F12|", "lengths.input") == approx(slope, abs=close)
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
         with raises(InputError, match=r"is not known here; known: .*F12"):
             slopes.of(wrong, "lengths.input")

@@ -7,9 +7,8 @@ from dataclasses import replace
 from math import atan2, cos, degrees, pi, remainder, sin
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx
+from pytest import approx, fixture, mark
 
 import fourbar
 from fourbar import Motion, Place, Scene, Sweep, Tolerance, solve, uniform, units
@@ -109,7 +108,7 @@ class Page:
         return self.run(script, ticks)
 
 
-@pytest.fixture
+@fixture
 def show(browse):
     """Opens the page of a scene."""
 
@@ -127,7 +126,7 @@ const points = e => [...e.getAttribute("d").matchAll(/[ML]([^ ]+) ([^ML]+)/g)]
 """Script of the points of a path, px."""
 
 
-@pytest.mark.slow
+@mark.slow
 def test_numbers_are_shown_in_the_units_of_the_page(show):
     scene = crank_rocker()
     page = show(scene, units=units("mm kN N.mm rpm"))
@@ -146,7 +145,7 @@ def test_numbers_are_shown_in_the_units_of_the_page(show):
     assert top == approx(1e3 * s.torque.max(), rel=0.01)
 
 
-@pytest.fixture
+@fixture
 def turning(show):
     """The page of the crank-rocker, and its solution."""
     return show(crank_rocker()), solve(crank_rocker())
@@ -169,7 +168,7 @@ def test_each_step_and_each_branch_shows_the_numbers_of_its_position(turning):
     page.require(solve(replace(s.scene, motion=crossed)), 3, *forces)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
     page, s = turning
     start = page.pins()["A"]
@@ -183,7 +182,7 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
     page.require(s, page.state("row"), "torque", "omega_4")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_an_input_that_turns_fully_goes_round(show):
     page = show(crank_rocker())
     rows = page.play(241)  # 12 s: two sweeps
@@ -191,7 +190,7 @@ def test_an_input_that_turns_fully_goes_round(show):
     assert sum(np.diff(rows) < 0) == 2
 
 
-@pytest.mark.slow
+@mark.slow
 def test_an_input_that_does_not_turn_fully_swings(show):
     scene = thesis(Sweep(0.0, 2 * pi, 180))
     page = show(scene)
@@ -203,7 +202,7 @@ def test_an_input_that_does_not_turn_fully_swings(show):
     assert np.abs(np.diff(rows)).max() <= 1  # it never jumps
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_free_motion_plays_once_in_its_own_time(show):
     page = show(RELEASED)
     s = solve(RELEASED)
@@ -223,8 +222,8 @@ def test_a_free_motion_plays_once_in_its_own_time(show):
     assert page.numbers("energy") == approx([kinetic], rel=PRINTED)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "motion, place, over, pace",
     [
         (
@@ -267,7 +266,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     assert page["status"].is_displayed() == (not s.assembled[0])
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(show, tmp_path):
     motion = Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
     scene = crank_rocker(title="a\\nb", motion=motion)
@@ -330,7 +329,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     assert not page.list("#acting *, #under .act")
 
 
-@pytest.mark.parametrize("scaling", ("sweep", "position"))
+@mark.parametrize("scaling", ("sweep", "position"))
 def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scaling):
     page, s = turning
     choose = """
@@ -355,7 +354,7 @@ def test_arrows_point_along_the_forces_to_the_scale_of_the_legend(turning, scali
         assert_allclose(drawn, s[name][50] * scale, atol=PIXEL)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_keyboard_drives_it(turning):
     from selenium.webdriver.common.action_chains import ActionChains
     from selenium.webdriver.common.keys import Keys
@@ -386,7 +385,7 @@ def test_keyboard_drives_it(turning):
     assert order == ["", "picture", "play", "back", "forward", "reset"]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_control_has_a_name(turning):
     page, _ = turning
     controls = page.list("button, select, input, [role=img]")
@@ -397,11 +396,9 @@ def test_every_control_has_a_name(turning):
     assert page["theta"].get_attribute("aria-valuetext").endswith("degrees")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("dark", (False, True))
-@pytest.mark.parametrize(
-    "scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis")
-)
+@mark.slow
+@mark.parametrize("dark", (False, True))
+@mark.parametrize("scene", (crank_rocker(), thesis()), ids=("crank-rocker", "thesis"))
 def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(show, scene, dark):
     page = show(scene, 360, dark=dark)
     assert page.state("document.documentElement.scrollWidth") <= 360
@@ -458,8 +455,8 @@ letters, px.
 """
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [400, 1024, 1440])
+@mark.slow
+@mark.parametrize("width", [400, 1024, 1440])
 def test_no_label_of_the_gallery_covers_another_one_or_a_symbol(show, width):
     gallery = sorted((MODELS / "gallery").glob("*.toml"))
     for path in (*gallery, MODELS / "thesis.toml", MODELS / "crank_rocker.toml"):
@@ -540,7 +537,7 @@ def test_it_says_why_a_position_has_no_forces(show):
         assert (remark in status.text) == status.is_displayed() == (drive_bar == 3)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(show):
     loose = (
         Tolerance("lengths.input", 5e-5),
@@ -576,7 +573,7 @@ def test_tolerances_have_bands_and_shares_in_the_units_of_the_page(show):
     assert "belong to the branch of the scene" in page["tolerance-note"].text
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_bars_of_the_sheet_have_the_units_of_its_heads(show):
     inch, pound = 0.0254, 0.45359237
     scene = crank_rocker()
@@ -597,7 +594,7 @@ def test_the_bars_of_the_sheet_have_the_units_of_its_heads(show):
         assert place == approx(stated, rel=PRINTED, abs=PRINTED)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(show):
     page = show(crank_rocker(), dark=True)
     options = {"printBackground": True}

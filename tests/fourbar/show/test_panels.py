@@ -3,8 +3,7 @@
 from math import exp, pi, sqrt
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar.show.panels import Wanted, fit_panels
 
@@ -22,7 +21,7 @@ def fit(curve, edges=EDGES, wanted="integrated"):
     return fit_panels(compute, edges, {"curve": Wanted(**{wanted: True})})
 
 
-@pytest.mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
+@mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
 def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
     panels = fit(lambda x: np.where(x < place, 2.0, -1.0))
@@ -36,7 +35,7 @@ def test_a_jump_costs_no_digits(place):
 POLE = sqrt(0.5)
 
 
-@pytest.mark.parametrize("power", (1.0, 2.0, 0.5))
+@mark.parametrize("power", (1.0, 2.0, 0.5))
 def test_what_grows_without_bound_is_said_to_and_where(power):
     def compute(places):
         curve = np.abs(places - POLE) ** -power
@@ -50,7 +49,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
     assert panels.integrate("other") == approx(right, rel=SETTLED)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "curve, peak, place",
     [
         (lambda x: np.where(x < 0.7, np.nan, -x), 2.0, 2.0),
@@ -75,8 +74,8 @@ def test_the_largest_size_is_the_first_of_equal_ones(curve, peak, place):
 ZEROS = [0.3, 0.8, 1.7]
 
 
-@pytest.mark.parametrize("edges", (EDGES, np.array([0.0, 0.31, 2.0])))
-@pytest.mark.parametrize(
+@mark.parametrize("edges", (EDGES, np.array([0.0, 0.31, 2.0])))
+@mark.parametrize(
     "curve, zeros",
     [
         (lambda x: np.prod([x - zero for zero in ZEROS], axis=0), ZEROS),
@@ -88,7 +87,7 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, e
     assert fit(curve, edges, "zeros").find_zeros("curve") == approx(zeros, abs=1e-9)
 
 
-@pytest.mark.parametrize("frequency", (400.0, 800.0))
+@mark.parametrize("frequency", (400.0, 800.0))
 def test_a_panel_that_is_not_settled_exceeds_no_peak(frequency):
     """Of many equal peaks the settled ones are right to a part of 1e-9."""
 

@@ -7,8 +7,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import (
     Bar,
@@ -45,7 +44,7 @@ def numbers(line):
     return [float(x) for x in re.findall(r"(?<!\S)-?[\d.]+(?:e[-+]\d+)?(?!\S)", line)]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, rates",
     [
         (Motion(1.0), []),
@@ -120,7 +119,7 @@ def write_forces(motion, gravity=ALONG, at=None, **parts):
     return PositionSheet(solution, units("N m")).write_pin_forces(), solution
 
 
-@pytest.mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
+@mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
 def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2, sense):
     """Weights along the line of all bars ask for no moment there.
 
@@ -147,8 +146,8 @@ def test_pin_forces_that_have_no_bound_on_a_change_point_have_no_value():
     assert rows[-1] == "on the change point no pin force has a limit"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gravity", [ALONG, ACROSS])
+@mark.slow
+@mark.parametrize("gravity", [ALONG, ACROSS])
 def test_a_release_has_the_limits_of_its_own_motion(gravity):
     """No torque acts: forces are bounded under any weight.
 
@@ -175,7 +174,7 @@ ONE_SIDED = [
 ]
 
 
-@pytest.mark.parametrize("motion", slow_but(ONE_SIDED[:2], ONE_SIDED))
+@mark.parametrize("motion", slow_but(ONE_SIDED[:2], ONE_SIDED))
 def test_a_motion_that_begins_ends_or_stands_still_has_no_limit(motion):
     rows, _ = write_forces(motion, at=("time", "0 s"))
     assert "begins, ends or stands still there, and has one side alone" in rows[-1]

@@ -6,8 +6,7 @@ import json
 from math import pi, tau
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import load, solve
 from fourbar.errors import InputError
@@ -91,7 +90,7 @@ mm lbs deg | write lbf for pounds-force
 """)
 
 
-@pytest.mark.parametrize("text, words", REFUSED)
+@mark.parametrize("text, words", REFUSED)
 def test_what_is_no_list_of_units_is_refused(text, words, run):
     with raises(InputError, match=words):
         units(text)
@@ -106,11 +105,11 @@ def test_units_are_read_as_people_write_them():
     assert units("in lb lbf")["N"][0] == "lbf"
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, shown",
     [({}, "rad/s"), ({"omega_2": "60 rpm"}, "rpm"), ({"omega_2": "9 deg/s"}, "deg/s")],
 )
-@pytest.mark.parametrize("length", ("300 mm", "12 in"))
+@mark.parametrize("length", ("300 mm", "12 in"))
 def test_a_released_motion_has_speeds_that_suit_its_accelerations(
     stated, shown, length
 ):
@@ -119,7 +118,7 @@ def test_a_released_motion_has_speeds_that_suit_its_accelerations(
     assert of_scene["rad/s"][0] == shown
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "length, names, of_length, of_torque",
     read_rows("""
 12 in | in, in/s, lbf in | 12 | 12
@@ -141,8 +140,6 @@ def test_lengths_have_results_in_their_unit(length, names, of_length, of_torque)
         assert 1.3558179483314004 * of[2][1] == approx(float(of_torque))
 
 
-@pytest.mark.parametrize(
-    "value, text", [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")]
-)
+@mark.parametrize("value, text", [(-0.0, "0"), (-1e-3, "-0.001"), (123456.7, "123500")])
 def test_a_number_has_four_digits_and_zero_no_sign(value, text):
     assert write_digits(value) == text

@@ -7,9 +7,8 @@ from itertools import pairwise
 from math import asin, cos, pi, radians, sin, sqrt, tau
 
 import numpy as np
-import pytest
 from numpy.polynomial.legendre import leggauss
-from pytest import approx
+from pytest import approx, mark
 from scipy.integrate import quad
 from scipy.special import ellipk
 
@@ -141,7 +140,7 @@ def scan(scene, ends, *corners):
     return np.concatenate(places), np.concatenate(weights)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", slow_but({"turn backwards", "load with corners", "stroke"}, SCENES)
 )
 def test_facts_are_those_of_a_dense_scan(name):
@@ -218,7 +217,7 @@ def check_loads(facts, sizes, weights):
         assert entry[key] == abs(panels.find_peak(quantity).value)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones():
     """Nothing acts but one force, so that everything is in proportion to it."""
 
@@ -263,7 +262,7 @@ pin_friction.B = { coefficient = 0.15, radius = "2 in" }
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_summary_beside_a_dead_point_is_as_quick_with_pin_friction():
     """From 44 in on the linkage does not assemble at first.
 
@@ -305,7 +304,7 @@ def release_pendulum(omega, duration, *effects):
     return Facts(solve(scene))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_released_swing_has_its_period_and_the_first_of_equal_extremes():
     """The period of a pendulum is an elliptic integral."""
     facts = release_pendulum(0.0, 1.7)
@@ -365,7 +364,7 @@ def test_angles_have_the_turn_of_the_first_position():
     assert low.value == approx(pi - 1e-3)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_transmission_angle_is_the_least_of_all_stretches():
     """The coupler rocks in two stretches, of which the sine of mu has both signs."""
     linkage = bare(1.102, 0.2906, 1.203, 1.152)

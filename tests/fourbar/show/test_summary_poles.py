@@ -6,8 +6,7 @@ from dataclasses import replace
 from math import atan2, degrees, hypot, pi, radians, sin, tau
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 from scipy.optimize import brentq
 
 from fourbar import (
@@ -130,7 +129,7 @@ POLES = {
 """Scenes, and the places at which something grows without bound, in their order."""
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name",
     slow_but({"cylinder in line with the crank", "limits of the output"}, POLES),
 )
@@ -170,8 +169,8 @@ def test_what_grows_without_bound_is_no_number_anywhere(name):
         assert ("none is enough, as the" in text) == sized
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("start, stop", ((-1.0, 1.0), (1.0, -1.0), (2.0, 4.0)))
+@mark.slow
+@mark.parametrize("start, stop", ((-1.0, 1.0), (1.0, -1.0), (2.0, 4.0)))
 def test_a_torque_is_largest_where_pin_forces_have_a_pole(start, stop):
     """T2 = (0.05 + 0.3 + 0.05) kg g 0.1 m cos(theta_2), largest at change points."""
     facts = find_facts(sweep(PARALLELOGRAM, start, stop))
@@ -180,7 +179,7 @@ def test_a_torque_is_largest_where_pin_forces_have_a_pole(start, stop):
     assert facts.motion.panels.growing == {*PIN_FORCE.values()}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
     """Whichever bar is driven, it gives the same power."""
     scene, _ = POLES["torque on the output"]
@@ -192,7 +191,7 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
     assert "speed peak 0.9 m/s power" in read_block(facts.solution)
 
 
-@pytest.mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
+@mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
 def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed):
     """Ends of the cylinder and O2 are in line; another position has a force."""
     motion = Motion(np.array([1.0, IN_LINE]), speed)
@@ -206,8 +205,8 @@ def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed
     assert "bore none is enough" in text and "peak unbounded" in text
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("lengths", ((0.37, 0.09, 0.09, 0.37), (0.2, 0.25, 0.21, 0.22)))
+@mark.slow
+@mark.parametrize("lengths", ((0.37, 0.09, 0.09, 0.37), (0.2, 0.25, 0.21, 0.22)))
 def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
     """Both circuits are one for the last lengths.
 
@@ -232,7 +231,7 @@ def test_ranges_over_change_points_and_gaps_are_those_of_the_angles(lengths):
         assert widths[0] <= swing(uniform(*lengths)) + LOCATED
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_gap_within_a_step_is_no_full_turn():
     """The longest bar exceeds what lets bar 2 turn by 1 um.
 
@@ -245,8 +244,8 @@ def test_a_gap_within_a_step_is_no_full_turn():
     assert "input turns fully" not in text and "per turn" not in text
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "start, steps, pins",
     [(0.0, 36, ("O2", "A", "B", "O4")), (-pi, 97, ("B",)), (0.3, 36, ("B",))],
 )

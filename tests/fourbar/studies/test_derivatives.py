@@ -4,9 +4,8 @@ import json
 import re
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Free,
@@ -40,7 +39,7 @@ the number.
 def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     """Others count by a hundredth of themselves, angles by a degree."""
     slopes = sensitivity(load(MODELS / "capabilities/drawn.toml"))
-    assert slopes.value("A")[0] == pytest.approx([0.095, 0.060])
+    assert slopes.value("A")[0] == approx([0.095, 0.060])
     longest = max(slopes.solution.scene.linkage.lengths)
     numbers = dict(zip(slopes.keys, slopes.numbers, strict=True))
     for key, step in {
@@ -51,7 +50,7 @@ def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
     }.items():
         (change,) = (row.change for row in slopes.influences("|F12|") if row.key == key)
         most = np.nanmax(np.abs(slopes.of("|F12|", key)))
-        assert abs(change) == pytest.approx(step * most, rel=EXACT)
+        assert abs(change) == approx(step * most, rel=EXACT)
 
 
 def test_where_there_is_no_derivative_a_status_says_why():
@@ -77,7 +76,7 @@ def test_where_there_is_no_derivative_a_status_says_why():
         assert np.isnan(rows[:, lost]).all() and np.isfinite(rows[:, ~lost]).all(), name
 
 
-@pytest.mark.parametrize("dry", [Friction.at(B=0.05), RUBBING[1]])
+@mark.parametrize("dry", [Friction.at(B=0.05), RUBBING[1]])
 def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
     """Torque and pin forces are those with friction 0; the speed makes them jump."""
     nominal = scene((Gravity(), dry), omega_2=0.0)
@@ -120,8 +119,8 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
 
 
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize(
+@mark.parametrize("branch", [1, -1])
+@mark.parametrize(
     "lengths, command",
     [
         (PARALLELOGRAM, "theta_2"),
@@ -142,7 +141,7 @@ def test_derivatives_are_the_differences_of_a_study_at_change_points(
         assert_allclose(slopes.of("theta_3", key), differences, rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, word",
     [
         ({"theta_2": FromLimit(1, 0.1)}, "limit moves"),
@@ -154,7 +153,7 @@ def test_what_has_no_sensitivities(motion, word):
         sensitivity(Scene(LINK, Motion(**motion, omega_2=1.0)))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_command_ranks_the_numbers_and_writes_them_all(show, run):
     model = MODELS / "crank_rocker.toml"
     command = "analyze", model, "--sensitivity"

@@ -10,9 +10,8 @@ from math import acos, asin, degrees, pi, radians, remainder, sqrt
 from pathlib import Path
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import (
     Bar,
@@ -156,7 +155,7 @@ PENDULUMS = {
 }
 
 
-@pytest.mark.parametrize("name", PENDULUMS)
+@mark.parametrize("name", PENDULUMS)
 def test_a_crank_with_mass_alone_is_a_pendulum(name):
     scene, expected, close = PENDULUMS[name]
     equilibria = equilibrium(scene)
@@ -198,7 +197,7 @@ def test_at_its_limits_the_output_is_a_pendulum_or_has_no_inertia():
     assert [rest.frequency for rest in swings] == approx([own] * 2)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     f = 0.2
     away = asin(f / (M * 9.81 * R))
@@ -235,9 +234,9 @@ HALF = Sweep(radians(30.0), radians(390.0), 180)
 BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize("branch", [1, -1])
+@mark.parametrize(
     "lengths, swept",
     [
         *zip(ONE_CHANGE_POINT, (FULL, HALF, BACK, None), strict=True),
@@ -272,7 +271,7 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
 
 
-@pytest.mark.slow
+@mark.slow
 def test_friction_holds_on_past_the_one_change_point():
     """Bars in line hold on both sides of it, in one range of the assembly."""
     linkage = FourBar(1.0, Bar(1.0, 10.0), Bar(2.0, 20.0), Bar(2.0, 20.0))
@@ -328,7 +327,7 @@ B = { stiffness = "10 N m/rad", rest = "-90 deg" }
 """
 
 
-@pytest.mark.parametrize("start, angles", [(60, []), (160, [167.7867])])
+@mark.parametrize("start, angles", [(60, []), (160, [167.7867])])
 def test_a_torsion_spring_is_followed_from_the_start_of_the_sweep(start, angles):
     """From the first angle that closes the spring at B is wound by 254.5 deg where the
     work of both would vanish, and by half a turn from 113 deg on; a sweep that begins
@@ -375,8 +374,8 @@ def springy_table(**motion):
 SWEPT = Sweep(radians(20.0), radians(140.0), 60)
 
 
-@pytest.mark.parametrize("branch", slow_but({1}, [1, -1]))
-@pytest.mark.slow
+@mark.parametrize("branch", slow_but({1}, [1, -1]))
+@mark.slow
 def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     """The other assembly has the same angles and an equilibrium among them."""
     equilibria = equilibrium(springy_table(theta_2=SWEPT, branch=branch))
@@ -422,7 +421,7 @@ def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
         assert_array_equal(curve.reached(curve.tau(points)), passed & (branch == 1))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("bar", "lengths"), [(2, (0.1, 0.09, 0.04, 0.085)), (4, (0.3, 0.1, 0.25, 0.22))]
 )
 def test_a_sweep_past_two_circuits_has_an_equilibrium_in_each(bar, lengths):
@@ -455,7 +454,7 @@ def test_equilibria_are_printed_in_the_units_of_the_file(show):
         assert words in printed
 
 
-@pytest.mark.slow
+@mark.slow
 def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     """Elsewhere it falls: the height of its mass centres grows with sin(theta_2)."""
     arm = Bar(0.5, 21.0)
@@ -470,7 +469,7 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     assert [words[angle] for angle in ("0", "180", "360")] == ["change_point"] * 3
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_command_prints_what_python_finds(show):
     file = MODELS / "problems/gz_physics_987.toml"
     printed = show("equilibrium", file)

@@ -8,9 +8,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Bar,
@@ -43,7 +42,7 @@ def solved(scene, bar, stations=None):
     return internal_forces(scene, solve(scene), bar, stations)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "bar, load, foot",
     read_rows("""
 4 | {} | 0
@@ -73,7 +72,7 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     assert internal.largest.x[0] == approx(foot, abs=ROUNDED)
 
 
-@pytest.mark.parametrize("centre, eighths", [(None, 1.0), ((0.125, 0.0), 2.0)])
+@mark.parametrize("centre, eighths", [(None, 1.0), ((0.125, 0.0), 2.0)])
 def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight(centre, eighths):
     """w L^2/8 in the middle of a uniform bar on two pins, twice that of a mass at G.
 

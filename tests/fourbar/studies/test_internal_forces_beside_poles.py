@@ -7,8 +7,7 @@ from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import internal_forces, load, solve
 from fourbar.show.summary import Facts
@@ -62,7 +61,7 @@ def find_pole(low, high):
     return 0.5 * (low + high)
 
 
-@pytest.mark.parametrize("low, high", [(1.0, 1.1), (3.7, 3.8)])
+@mark.parametrize("low, high", [(1.0, 1.1), (3.7, 3.8)])
 def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
     distances = np.logspace(-2, -12, 11)
     places = find_pole(low, high) + np.concatenate([-distances, distances])
@@ -75,7 +74,7 @@ def test_the_rounding_of_a_pole_bends_no_bar_without_drive(low, high):
     assert output_bar == approx(bend_output(places), rel=ROUNDED, abs=0.0)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_largest_moments_are_those_of_balls():
     """That of the input is the same everywhere, that of the output has a maximum."""
     facts = Facts(solve(SCENE))

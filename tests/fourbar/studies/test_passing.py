@@ -8,8 +8,7 @@ from dataclasses import replace
 from math import cos, pi, radians, sqrt
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import (
     Load,
@@ -62,7 +61,7 @@ def find_positions(scene, name, value):
     return locate(extend_motion(scene), name, f"{value!r} {unit}")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "scene, name",
     [
         (crank_rocker(motion=Motion()), "theta_4"),
@@ -85,8 +84,8 @@ def test_every_position_with_a_value_is_found_in_rising_order(scene, name):
         assert 0.0 <= found.angle[0] < found.angle[1] <= 2.0 * pi
 
 
-@pytest.mark.parametrize("beside", [0.0, 5e-7, -5e-7])
-@pytest.mark.parametrize("side", [1.0, -1.0])
+@mark.parametrize("beside", [0.0, 5e-7, -5e-7])
+@mark.parametrize("side", [1.0, -1.0])
 def test_a_limit_of_the_output_is_one_position(side, beside):
     """Input and coupler are in line: O2 B is their sum, or their difference."""
     scene = crank_rocker()
@@ -119,7 +118,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize("scene, name, value, words", REFUSED)
+@mark.parametrize("scene, name, value, words", REFUSED)
 def test_a_place_out_of_range_is_refused_with_the_range(scene, name, value, words):
     with raises(FourBarError, match=words):
         find_positions(scene, name, value)
@@ -145,8 +144,8 @@ def test_the_range_of_a_refusal_is_that_of_the_motion_and_not_the_other_one():
     assert (least % 360.0, most % 360.0) == approx(extent, rel=2e-3)
 
 
-@pytest.mark.parametrize("turned", [0.0, 2.0 * pi, -4.0 * pi])
-@pytest.mark.parametrize("lengths", [(0.3, 0.2, 0.25, 0.1), (0.3, 0.1, 0.25, 0.22)])
+@mark.parametrize("turned", [0.0, 2.0 * pi, -4.0 * pi])
+@mark.parametrize("lengths", [(0.3, 0.2, 0.25, 0.1), (0.3, 0.1, 0.25, 0.22)])
 def test_positions_are_counted_as_the_motion_that_enters_its_range(lengths, turned):
     """Of the second range of bar 2, or of a crank; a load is stated for a part."""
     linkage = bare(*lengths)
@@ -207,7 +206,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     assert say_range(none) == "this cylinder can have none with motion.side = left"
 
 
-@pytest.mark.parametrize(("beyond", "met"), [(4e-6, True), (6e-6, False)])
+@mark.parametrize(("beyond", "met"), [(4e-6, True), (6e-6, False)])
 def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
     """Printed with six digits a limit may lie beyond itself."""
     linkage = crank_rocker().linkage

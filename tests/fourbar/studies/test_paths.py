@@ -3,8 +3,7 @@
 from math import acos, cos, radians, sin
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 from fourbar import solve, units
 from fourbar.files import loads
@@ -27,7 +26,7 @@ P = { bar = 3, from_pin = { x = "12.08631 mm", y = "7.475779 mm" } }
 """Of a Stirling engine, whose piston goes 10 mm within 0.1 mm."""
 
 
-@pytest.mark.parametrize("angle, steps", [("32.31614688136", "36"), ("52.3", "360")])
+@mark.parametrize("angle, steps", [("32.31614688136", "36"), ("52.3", "360")])
 def test_the_drive_of_an_engine_is_as_straight_as_it_is_said_to_be(angle, steps):
     """Whatever the ground's angle, and however coarse the steps are."""
     text = DRIVE.replace("ANGLE", angle).replace("STEPS", steps)
@@ -49,7 +48,7 @@ P = { bar = 2, from_pin = ["80 mm", "0 deg"] }
 RISE = 'law = { kind = "345", theta_2 = "20 deg", rise = ["80 deg", "1 s"]'
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, ends",
     [
         ('theta_2 = { from = "20 deg", to = "100 deg", steps = 3 }', (20, 100)),
@@ -93,7 +92,7 @@ def test_a_turn_past_two_circuits_has_an_arc_in_each():
         assert path.straightness == approx(0.08 * (1.0 - cos(half)), abs=1e-12)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_circle_is_as_wide_in_every_direction():
     """The polygon of the steps would be narrower by 1e-6 of it."""
     (path,) = measure_paths(solve(loads(CRANK + 'omega_2 = "1 rad/s"\n'))).values()

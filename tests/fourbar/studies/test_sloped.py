@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 from fourbar import Motion, equilibrium, sensitivity, solve
 from fourbar.effects.effect import Effect
@@ -57,17 +56,17 @@ def check_against_differences(function, x):
             assert abs(part.slopes[0, 0] - slope) <= DIFFERENCES * size
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # roots of negative numbers
-@pytest.mark.parametrize("function", ufuncs(1), ids=lambda f: f.__name__)
-@pytest.mark.parametrize("x", POINTS)
+@mark.filterwarnings("ignore::RuntimeWarning")  # roots of negative numbers
+@mark.parametrize("function", ufuncs(1), ids=lambda f: f.__name__)
+@mark.parametrize("x", POINTS)
 def test_a_function_of_one_number_has_its_slope_or_is_refused(function, x):
     check_against_differences(function, x)
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # powers of negative numbers
-@pytest.mark.parametrize("function", ufuncs(2), ids=lambda f: f.__name__)
-@pytest.mark.parametrize("x", POINTS)
-@pytest.mark.parametrize("constant", [0.7, -1.1])
+@mark.filterwarnings("ignore::RuntimeWarning")  # powers of negative numbers
+@mark.parametrize("function", ufuncs(2), ids=lambda f: f.__name__)
+@mark.parametrize("x", POINTS)
+@mark.parametrize("constant", [0.7, -1.1])
 def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(function, x, constant):
     def of_first(x):
         return function(x, constant)
@@ -80,7 +79,7 @@ def test_a_function_of_two_numbers_has_its_slopes_or_is_refused(function, x, con
         check_against_differences(one, x)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "change",
     [
         lambda x: np.maximum(x, 0.0),
@@ -114,7 +113,7 @@ class Drag(Effect):
         actions.couple(2, -getattr(np, self.form)(square, omega))
 
 
-@pytest.mark.parametrize("speed", [-2.0, 2.0])
+@mark.parametrize("speed", [-2.0, 2.0])
 def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     def dragged(form, speed):
         motion = Motion(1.0, speed)

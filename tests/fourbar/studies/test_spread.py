@@ -9,9 +9,8 @@ from math import copysign, sqrt
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import approx, raises
+from pytest import approx, mark, raises
 from scipy.stats import norm
 
 from fourbar import (
@@ -136,7 +135,7 @@ BAD = read_rows("""
 """)
 
 
-@pytest.mark.parametrize("line, words", BAD)
+@mark.parametrize("line, words", BAD)
 def test_a_bad_tolerance_is_one_line(line, words):
     with raises(InputError) as error:
         loads(MODEL + "[tolerances]\n" + line, "s.toml")
@@ -160,7 +159,7 @@ def test_the_positions_at_which_first_order_fails_are_named_each():
 INPUT = Tolerance("lengths.input", 5e-5)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, options, words",
     [
         ((), {}, "states none"),

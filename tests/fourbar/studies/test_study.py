@@ -7,9 +7,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import raises
+from pytest import mark, raises
 
 from fourbar import (
     Bar,
@@ -116,7 +115,7 @@ def alone(study, values, member):
     return one
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "effects, drive, stage",
     [(DRIVEN, 4, "error"), (RUBBING, 2, "force"), ((), 2, "position")],
 )
@@ -138,7 +137,7 @@ def test_a_member_is_its_linkage_alone(effects, drive, stage):
                 assert_array_equal(array[member], expected, err_msg=name)
 
 
-@pytest.mark.parametrize("size", (3, 12))
+@mark.parametrize("size", (3, 12))
 def test_blocks_over_members_and_positions_change_no_digit(size, monkeypatch):
     """A block holds positions of one member, or several members."""
     case = scene(DRIVEN)
@@ -210,7 +209,7 @@ OTHER_MOTIONS = [
 MASSES = {"bars.coupler.mass": [1.0, 2.0]}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, values, words",
     [
         *((Motion(ANGLES, 3.0), json.loads(values), said) for values, said in REFUSED),

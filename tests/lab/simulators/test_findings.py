@@ -5,7 +5,7 @@ What each says of itself, its script where the engine is, and the list of them.
 
 import re
 
-import pytest
+from pytest import mark, skip
 
 from fourbar_lab.simulators.findings import (
     FIELDS,
@@ -19,15 +19,15 @@ ALL = read_findings()
 SECONDS = 100.0
 
 
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
+@mark.slow
+@mark.nightly
+@mark.parametrize("finding", ALL, ids=lambda finding: finding.script.stem)
 def test_each_finding_holds_or_says_since_when_not(finding, monkeypatch):
     # no test makes an environment
     engines = "fourbar_lab.simulators.findings.read_engines"
     monkeypatch.setattr(engines, lambda folders: {})
     if (place := find_interpreter(finding)) is None:
-        pytest.skip(f"not run: {finding.engine[0]} is not installed")
+        skip(f"not run: {finding.engine[0]} is not installed")
     since_fixed = not finding.fields["Until"].startswith("still")
     assert finding.run(place[0], SECONDS) in ("holds", FIXED)[: 1 + since_fixed]
 

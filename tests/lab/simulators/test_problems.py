@@ -11,9 +11,9 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pytest
 from jsonschema import Draft202012Validator
 from mpmath import mp
+from pytest import mark
 from scipy import integrate, special
 
 import fourbar
@@ -82,8 +82,8 @@ def test_there_are_fifteen_and_their_files_agree():
     assert {file.stem for file in PROBLEMS.glob("*.json")} == {*NAMES}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in LONG])
+@mark.slow
+@mark.parametrize("name", [name for name in NAMES if name not in LONG])
 def test_the_files_are_those_of_today(name):
     old, new = read_stored(name), json.loads(json.dumps(collect_problem(name)))
     assert old["schema"] == PROBLEM_SCHEMA
@@ -102,7 +102,7 @@ def test_the_files_are_those_of_today(name):
         assert (bar > 0.0).all() and (apart <= APART * bar).all(), quantity
 
 
-@pytest.mark.parametrize("name", slow_but(set(NAMES) - {"iftomm_a02"}, NAMES))
+@mark.parametrize("name", slow_but(set(NAMES) - {"iftomm_a02"}, NAMES))
 def test_a_problem_is_what_the_schema_says(name):
     schema = json.loads(read("docs/protocol.schema.json"))
     check = Draft202012Validator({"$ref": "#/$defs/problem", "$defs": schema["$defs"]})
@@ -112,9 +112,7 @@ def test_a_problem_is_what_the_schema_says(name):
         assert not check.is_valid({**problem, wrong: {}})
 
 
-@pytest.mark.parametrize(
-    "name", sorted({*NAMES} - {"gz_physics_987", "iftomm_a02", *SLIDING})
-)
+@mark.parametrize("name", sorted({*NAMES} - {"gz_physics_987", "iftomm_a02", *SLIDING}))
 def test_ninety_digits_or_free_bodies_answer_the_same(name):
     by_bodies = name in ("cylinder", "pin_friction")
     engine = FreeBody if by_bodies else BallArithmetic
@@ -179,7 +177,7 @@ def slide(scene, place, omega, alpha):
     }
 
 
-@pytest.mark.parametrize("name", SLIDING)
+@mark.parametrize("name", SLIDING)
 def test_virtual_work_answers_the_slider_cranks_the_same(name):
     problem = read_stored(name)
     command = problem["command"]
@@ -330,7 +328,7 @@ def spoil(error):
     return torque
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("torque", "level"),
     [
         (spoil(0.0), "A"),
@@ -373,7 +371,7 @@ def test_an_answer_at_its_own_motion_is_judged_there():
     assert set(find_levels(judge_answers(problem, answer_file)).values()) != {"A"}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("text", "status_of_it", "said"),
     [
         (

@@ -9,7 +9,7 @@ import re
 from importlib.util import find_spec
 
 import numpy as np
-import pytest
+from pytest import approx, fixture, importorskip, mark
 
 import fourbar
 from fourbar.mjcf import write_mjcf
@@ -71,7 +71,7 @@ def find_errors(simulator, **setting):
     return {row.quantity: row.error for row in judge_answers(PROBLEM, data)}
 
 
-@pytest.fixture
+@fixture
 def sealed(monkeypatch):
     """The writers of model files have no formulas.
 
@@ -80,7 +80,7 @@ def sealed(monkeypatch):
     monkeypatch.delattr("fourbar.mjcf.document.solve")
 
 
-@pytest.mark.usefixtures("sealed")
+@mark.usefixtures("sealed")
 def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
     paths = [
         path
@@ -117,7 +117,7 @@ def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated
         assert abs(math.remainder(level, math.tau)) < 1e-12
 
 
-@pytest.mark.usefixtures("sealed")
+@mark.usefixtures("sealed")
 def test_mujoco_answers_at_states_and_through_a_turn():
     at_states = find_errors(mujoco_c.MujocoFile)
     through = find_errors(mujoco_c.MujocoFile, steps_per_turn=157)
@@ -126,8 +126,8 @@ def test_mujoco_answers_at_states_and_through_a_turn():
     assert find_errors(mujoco_c.MujocoFile, name="its defaults")["torque"] > THROUGH
 
 
-@pytest.mark.usefixtures("sealed")
-@pytest.mark.parametrize("setting", ["constraintDynamics", "lcaba", "ADMM", "PGS"])
+@mark.usefixtures("sealed")
+@mark.parametrize("setting", ["constraintDynamics", "lcaba", "ADMM", "PGS"])
 def test_each_solver_of_pinocchio_carries_the_loop(setting):
     solvers = pinocchio_simulated.PinocchioSolvers
     accurate = setting in ("constraintDynamics", "lcaba")
@@ -166,23 +166,21 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
     (_, of_right), (_, of_wrong), (_, of_zero), refused, unread = compared
     assert set(of_right) == {"torque", *by} and "motion.theta_2" in by
     assert all(float(error) < DIFFERENCES for error in of_right.values())
-    assert all(float(of_wrong[key]) == pytest.approx(0.1, abs=1e-3) for key in by)
+    assert all(float(of_wrong[key]) == approx(0.1, abs=1e-3) for key in by)
     assert {of_zero[key] for key in by} == {"zero"}
     assert refused == ("refused", {})
     assert unread == ("no derivatives that can be read: KeyError: 'how'", {})
 
 
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.usefixtures("sealed")
-@pytest.mark.parametrize(
-    "name", [name for name, entry in ENTRIES.items() if entry.steps]
-)
+@mark.slow
+@mark.nightly
+@mark.usefixtures("sealed")
+@mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.steps])
 def test_each_simulator_that_is_installed_carries_the_loop(name):
     entry = ENTRIES[name]
     module, _, cls = entry.adapter.partition(":")
     assert find_spec(module) is not None
-    simulator = getattr(pytest.importorskip(module, exc_type=ImportError), cls)
+    simulator = getattr(importorskip(module, exc_type=ImportError), cls)
     setting = {"name": entry.setting or None, "steps_per_turn": entry.steps[1]}
     allowed = COARSE
     if "tolerance" in vars(simulator):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-import pytest
 from click.testing import CliRunner
+from pytest import MonkeyPatch, approx, fixture, mark, raises
 
 import fourbar
 from fourbar.scene import Command
@@ -30,7 +30,7 @@ from tests.validation.cost.test_cost import turning
 from tests.validation.engines.mujoco.test_simulate import hood
 
 
-@pytest.fixture
+@fixture
 def call(tmp_path):
     """Return a function that asks for advice on files of scenes, with options."""
 
@@ -45,8 +45,8 @@ def call(tmp_path):
     return run
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "omega, required, most",
     [(10.0, 1e-4, 75), (1000.0, 1e-6, 300), (100.0, 2e-9, 1000)],
 )
@@ -66,7 +66,7 @@ def test_figures_of_the_crank_rocker(omega, required, most):
     assert advice.best.steps * advice.best.step_cost <= 1.2 * min(work) < max(work)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_solver_is_searched_too():
     """A solver that stops by itself takes a third of a step less, at the same error."""
     scene, required = turning(10.0, 72), 1e-4
@@ -80,7 +80,7 @@ def test_the_solver_is_searched_too():
     assert f"vary by {advice.best.speed_error:.1e}" in advice.reason
     tight = replace(settings, tolerance=0.0, iterations=10, flywheel=1e5)
     error = matters.judge_trial(scene, setup.try_out(tight)).worst
-    assert error == pytest.approx(advice.best.errors.worst, rel=0.5)
+    assert error == approx(advice.best.errors.worst, rel=0.5)
 
 
 def test_a_drive_elsewhere_is_judged_between_the_steps_too():
@@ -105,8 +105,8 @@ def test_no_curve_is_drawn_through_a_pole():
     assert matters.judge_trial(scene, trial).worst < 0.1
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "name, most",
     # of the thesis errors between the steps decide
     [("double_rocker", 1000), ("triple_rocker", 1000), ("thesis", 1600)],
@@ -117,7 +117,7 @@ def test_figures_of_rockers_and_the_thesis(name, most):
     assert max(advice.best.steps, advice.best.steps_per_revolution) <= most
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_file_alone_keeps_the_error(tmp_path, call):
     """What -o writes, loaded by nothing but its text.
 
@@ -142,7 +142,7 @@ def test_the_file_alone_keeps_the_error(tmp_path, call):
     assert steps < 100 and compute_errors(turning(), commanded, columns).worst <= 1e-5
 
 
-@pytest.mark.slow
+@mark.slow
 def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch, call):
     monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
     still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
@@ -164,15 +164,15 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one():
     assert compute_expected_error(turning(), answer) == math.inf
 
 
-@pytest.mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
+@mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
 def test_an_error_is_between_0_and_1(required):
     for ask, asked in ((advise.advise, turning()), (adjust_engines, ENGINES)):
-        with pytest.raises(fourbar.InputError, match="above 0 and below 1"):
+        with raises(fourbar.InputError, match="above 0 and below 1"):
             ask(asked, required)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("required", [1e-3, 1e-7])
+@mark.slow
+@mark.parametrize("required", [1e-3, 1e-7])
 def test_a_run_is_no_more_precise_than_required(required):
     scene = turning(positions=90)
     record = judge("s", scene, adjust_engines(THROUGH_TIME, required))
@@ -186,7 +186,7 @@ def test_a_run_is_no_more_precise_than_required(required):
     evidence = answer.evidence
     assert evidence["wanted_error"] == required >= evidence["expected_error"]
     # the engine's own prediction is what the formulas find, though it never saw them
-    assert max(errors) == pytest.approx(evidence["expected_error"], rel=0.5)
+    assert max(errors) == approx(evidence["expected_error"], rel=0.5)
     assert evidence["steps"] < 628
 
 
@@ -208,7 +208,7 @@ def test_exact_engines_stay_exact():
     assert changed.answers == THROUGH_TIME[0].answers
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     """Each scene is made so that one setting carries it."""
     for scene, setting, why in (
@@ -226,12 +226,12 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
     assert matters.write_sentence(quiet).startswith("No setting matters by itself")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     setup = JudgedSetup(turning(10.0, 36))
     attempt = advise.advise(turning(10.0, 36), 1e-2, setup).best
     clocks = (lambda count: 2e-6 * count), (lambda count: 3e-5 * count)
-    with pytest.MonkeyPatch.context() as patch:
+    with MonkeyPatch.context() as patch:
         patch.setattr(setup, "make_clocks", lambda *_: clocks)
         words = advise._describe_time(setup, attempt)
     revolution = 1e3 * (2e-6 * attempt.steps + 3e-5 * attempt.readings)
@@ -240,7 +240,7 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
     assert f"({revolution:.2g} ms per revolution): {attempt.steps} steps, and" in words
 
 
-@pytest.mark.slow
+@mark.slow
 def test_several_scenes_have_one_table(call):
     still = replace(turning(10.0, 36), motion=fourbar.Motion(1.0, 1.0))
     scenes = {"one": turning(10.0, 36), "still": still}

@@ -4,8 +4,7 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 import fourbar
 from fourbar.mjcf import Settings
@@ -37,8 +36,8 @@ def answer(**off):
     return quantities
 
 
-@pytest.mark.parametrize("name", ERROR_NAMES)
-@pytest.mark.parametrize("part", (5e-6, 1e-9))
+@mark.parametrize("name", ERROR_NAMES)
+@mark.parametrize("part", (5e-6, 1e-9))
 def test_each_error_is_the_part_that_an_answer_is_off(name, part):
     errors = compute_errors(SCENE, COMMAND, answer(**{name: part}))
     for field, error in zip(ERROR_NAMES, errors, strict=True):
@@ -90,7 +89,7 @@ class Pretended:
         return (lambda steps: 1e-6 * steps), (lambda readings: 1e-6 * readings)
 
 
-@pytest.mark.parametrize("wanted", (1e-4, 1e-6))
+@mark.parametrize("wanted", (1e-4, 1e-6))
 def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted):
     advice = advise.advise(SCENE, wanted, Pretended())  # type: ignore[arg-type]
     assert advice.reached and advice.best.errors.worst <= 0.7 * wanted
@@ -98,9 +97,7 @@ def test_advice_reaches_the_error_with_room_and_with_few_steps(wanted):
     assert advice.best.steps <= 1.3 * least
 
 
-@pytest.mark.parametrize(
-    "setup", (Pretended(floor=1e-3), Pretended(broken="it came apart"))
-)
+@mark.parametrize("setup", (Pretended(floor=1e-3), Pretended(broken="it came apart")))
 def test_what_no_setting_reaches_is_not_advised(setup):
     advice = advise.advise(SCENE, 1e-5, setup)  # type: ignore[arg-type]
     assert not advice.reached and "No setting of plain MJCF" in advice.reason

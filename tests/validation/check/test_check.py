@@ -8,8 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
-from pytest import approx, raises
+from pytest import approx, fixture, mark, raises
 
 import fourbar
 from fourbar import Bar, Friction, Load, Motion, Sweep, Torsion
@@ -86,7 +85,7 @@ def list_differing(scene, table):
     return {one.quantity for one in findings if not one.agrees}
 
 
-@pytest.fixture
+@fixture
 def judged(read):
     """Judges numbers that are written as a table."""
 
@@ -96,7 +95,7 @@ def judged(read):
     return judge
 
 
-@pytest.fixture
+@fixture
 def check(tmp_path, capsys):
     """Judges the text of a table by the command: status, output in one line, errors."""
 
@@ -115,7 +114,7 @@ def check(tmp_path, capsys):
     return call
 
 
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+@mark.parametrize("scene", SCENES.values(), ids=SCENES)
 def test_right_digits_agree_and_the_last_of_them_is_judged(scene, read):
     """A theta_2 that is rounded as the rest is allowed for, and excuses no more."""
 
@@ -154,14 +153,14 @@ def test_blank_cells_are_counted_and_the_rest_of_their_row_is_judged(read):
     assert judgement.sentence().endswith("; 3 of 6 cells are blank")
 
 
-@pytest.mark.parametrize("angle, half", [("20.5", 0.0), ("20.5003", 0.00005)])
+@mark.parametrize("angle, half", [("20.5", 0.0), ("20.5003", 0.00005)])
 def test_whole_degrees_are_positions_that_somebody_chose(angle, half, read):
     """Zeros may be left off: a column has the decimals of its longest number."""
     table = read(f"theta_2 [deg],torque\n10,1.0\n{angle},1.0\n")
     assert table.find_half(table.place) == approx(np.radians(half), rel=1e-9)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.1])
+@mark.parametrize("factor", [1.0, 1.1])
 def test_what_the_digits_of_the_angle_explain_is_no_mistake(factor, read):
     """They are no positions of the scene: somebody may have chosen whole tenths."""
     angles = np.radians([30.84, 47.21, 68.77])
@@ -501,7 +500,7 @@ for name, words, names, factor in UNITS_TAKEN:
     MISTAKES[name][words] = units(*names.split(), factor=float(factor))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, words",
     [(name, words) for name, planted in MISTAKES.items() for words in planted],
 )
@@ -541,7 +540,7 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text(read):
     assert not {text for text in texts if not any(words in text for words in cases)}
 
 
-@pytest.mark.parametrize("name", ["drawn", "loads", "push_output"])
+@mark.parametrize("name", ["drawn", "loads", "push_output"])
 def test_places_by_points_and_arms_have_hypotheses(name):
     """A place of one bar is refused on another, and an arm on a force that turns."""
     scene = fourbar.load(MODELS / "capabilities" / f"{name}.toml")
@@ -549,7 +548,7 @@ def test_places_by_points_and_arms_have_hypotheses(name):
     assert any("(bar 4): its force acts at G" in text for text in texts)
 
 
-@pytest.mark.parametrize("digits", [4, 5])
+@mark.parametrize("digits", [4, 5])
 def test_a_ratio_fitted_to_rounded_numbers_and_one_to_SI_are_named(
     digits, judged, read
 ):
@@ -574,7 +573,7 @@ def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, r
         assert [one.text for one in judgement.explanations] == texts
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
     slip = numbers["torque"] * np.where(np.arange(12) == 5, -1.0, 1.0)
@@ -617,7 +616,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("words", OTHERS)
+@mark.parametrize("words", OTHERS)
 def test_the_table_of_another_scene_is_explained(words, read):
     scene, numbers = OTHERS[words]
     name = scene.motion.commanded
@@ -628,7 +627,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
     assert first == words and not any("of two bars" in text for text in more)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "part, code, words",
     read_rows("""
 0 | 0 | 24 of 24 numbers agree
@@ -650,7 +649,7 @@ def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check)
     assert result == int(code) and words in out
 
 
-@pytest.mark.parametrize("axis, name", [(0, "F12_x"), (1, "F12_y")])
+@mark.parametrize("axis, name", [(0, "F12_x"), (1, "F12_y")])
 def test_the_sign_of_one_component_is_named_by_itself(axis, name, read):
     numbers = right(OURS)
     columns = {"theta_2": numbers["theta_2"], name: -numbers["F12"][:, axis]}
@@ -676,7 +675,7 @@ def test_a_size_is_that_of_one_force_without_a_sign(read):
     assert [one.text for one in told] == ["F43 = F14"]
 
 
-@pytest.mark.parametrize("torque, code", [("0.0", HOLDS), ("0.04", FAILED)])
+@mark.parametrize("torque, code", [("0.0", HOLDS), ("0.04", FAILED)])
 def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, check):
     """Bars without mass or load take no torque.
 
@@ -703,7 +702,7 @@ REFUSED_MOTIONS = [
 ]
 
 
-@pytest.mark.parametrize("motion, words", REFUSED_MOTIONS)
+@mark.parametrize("motion, words", REFUSED_MOTIONS)
 def test_a_motion_that_rows_are_not_found_by_is_refused_in_one_line(
     motion, words, check
 ):
@@ -780,7 +779,7 @@ theta_4 [deg],torque\n190,1\n | line 2, theta_4 = '190 deg': the motion passes i
 """)
 
 
-@pytest.mark.parametrize("text, words", BAD_TABLES)
+@mark.parametrize("text, words", BAD_TABLES)
 def test_a_bad_table_is_one_line(text, words, check):
     written = text.encode().decode("unicode_escape").encode("latin-1")
     code, _, error = check(THESIS, written)
@@ -799,8 +798,8 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(read, check):
     assert [finding.line for finding in judgement.findings] == [2]
 
 
-@pytest.mark.parametrize("degrees", [False, True])
-@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@mark.parametrize("degrees", [False, True])
+@mark.parametrize("delimiter", [",", ";", "\t"])
 def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     delimiter, degrees, check
 ):
@@ -820,9 +819,7 @@ def test_the_file_of_analyze_is_read_as_it_is_and_as_a_spreadsheet_saves_it(
     assert "429 of 429 numbers agree" in printed
 
 
-@pytest.mark.parametrize(
-    "name", slow_but({"drawn"}, ["drawn", "springs", "push_output"])
-)
+@mark.parametrize("name", slow_but({"drawn"}, ["drawn", "springs", "push_output"]))
 def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     """Each is judged at its own scale: A_x was once judged in newtons.
 
@@ -850,7 +847,7 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
         assert list_differing(scene, theirs) == {key}
 
 
-@pytest.mark.parametrize("wrong", [False, True])
+@mark.parametrize("wrong", [False, True])
 def test_magnitudes_and_a_whole_imperial_table(wrong, read):
     numbers = right(OURS)
     inch, pound = 0.0254, 4.4482216152605
@@ -955,7 +952,7 @@ def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(re
 WITHOUT_SPEED = recommand(OURS, speed=None, acceleration=0.0)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(read):
     rates = {
         "omega_2": np.linspace(2.0, 9.0, 12),
@@ -979,7 +976,7 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(re
     assert judge(WITHOUT_SPEED, "F12").not_assembled == [5]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "decimals, factor, said",
     read_rows("""
 6 | 1 |
@@ -1004,7 +1001,7 @@ def test_the_speed_and_acceleration_of_a_row_are_rounded_too(
     assert found.startswith(said)
 
 
-@pytest.fixture
+@fixture
 def torques(read):
     """Reads theta_2 of a crank-rocker in whole degrees and its torque in a form."""
     degrees = np.arange(0.0, 360.0, 30.0)
@@ -1029,7 +1026,7 @@ def with_comma(theta, torque):
     return f"{theta:.0f};{torque:.9f}".replace(".", ",")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "form",
     [
         ("# made by hand\ntheta_2 [deg],torque",),
@@ -1063,9 +1060,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     assert note.startswith(words)
 
 
-@pytest.mark.parametrize(
-    "heading", ["omega", "R12x [N]", "F12 / F32", "T12 [K]", "W3 [N]"]
-)
+@mark.parametrize("heading", ["omega", "R12x [N]", "F12 / F32", "T12 [K]", "W3 [N]"])
 def test_a_column_of_an_unknown_name_is_left_out_by_name(heading, torques):
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
     ((name, why),) = table.left_out.items()
@@ -1101,7 +1096,7 @@ zeros: they are digits where they are right, as of 2.00 and -0.60, and not of -0
 """
 
 
-@pytest.mark.parametrize("rows, code, words", COARSE)
+@mark.parametrize("rows, code, words", COARSE)
 def test_a_number_without_a_digit_agrees_with_nothing(rows, code, words, check):
     rows, *options = rows.replace(r"\n", "\n").split(" ")
     text = f"theta_2 [deg],torque [N m],F12 [N]\n{rows}\n"
@@ -1133,7 +1128,7 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     assert "looks like" not in printed
 
 
-@pytest.mark.parametrize("alike, explained", [(9, True), (8, False)])
+@mark.parametrize("alike, explained", [(9, True), (8, False)])
 def test_a_mistake_that_explains_less_than_nine_tenths_is_not_printed(
     alike, explained, judged
 ):
@@ -1168,8 +1163,8 @@ length = "18 in"
 """The cylinder holds the spring: no pin has a load but rounding."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "name, options, angle",
     read_rows("""
 thesis |  | theta_2 [deg]
@@ -1206,8 +1201,8 @@ def test_the_default_csv_returns_to_the_last_digit(
     assert counts[0] == counts[1]
 
 
-@pytest.mark.parametrize("digits, power", slow_but({(5, -4)}, [(8, -7), (5, -4)]))
-@pytest.mark.slow
+@mark.parametrize("digits, power", slow_but({(5, -4)}, [(8, -7), (5, -4)]))
+@mark.slow
 def test_a_right_table_of_fewer_digits_than_it_prints_is_told_the_tolerance(
     digits, power, check
 ):

@@ -7,8 +7,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from pytest import raises
+from pytest import fixture, mark, raises
 
 import fourbar
 from fourbar import Motion, Sweep, solve
@@ -49,7 +48,7 @@ def tabulate(angle, angles, torque, form="{:.12g}"):
     return "\n".join([*rows, ""])
 
 
-@pytest.fixture
+@fixture
 def judged(read):
     """Judges a table whose rows are found by an angle."""
 
@@ -72,8 +71,8 @@ def at_angles(angles):
     return Command(np.array(angles), np.ones(len(angles), np.int8), 2.0, -1.0)
 
 
-@pytest.mark.parametrize("bar, ends", [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
-@pytest.mark.parametrize("same", [True, False])
+@mark.parametrize("bar, ends", [(4, (115.0, 155.0)), (3, (40.0, 75.0))])
+@mark.parametrize("same", [True, False])
 def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     scene = commanding(bar, *ends)
     angles = np.radians(np.linspace(*ends, 9 if same else 6))
@@ -111,7 +110,7 @@ def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
         assert [finding.line for finding in found.differing] == lines
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, form, shift",
     read_rows("""
 theta_2 [deg] | .2f | 0
@@ -140,7 +139,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(
         assert agree == {shift == "0"}
 
 
-@pytest.mark.parametrize("ends, side", [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)])
+@mark.parametrize("ends, side", [((60.0, 220.0), 1.0), ((245.0, 395.0), -1.0)])
 def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judged):
     """It is passed twice a turn, and once within the range of the scene."""
     scene = commanding(2, *ends)
@@ -187,7 +186,7 @@ def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
     assert judged(scene, "theta_4", angles, expected, "{:.0f}").status == HOLDS
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, commanded, angle",
     read_rows("""
 Angle | theta_4 | theta_4
@@ -254,7 +253,7 @@ def follow_rise(time):
     return theta, omega, alpha, solve(SERVO, at=at).torque
 
 
-@pytest.mark.parametrize("names, refused", LOGGED)
+@mark.parametrize("names, refused", LOGGED)
 def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     theta, omega, alpha, torque = follow_rise(time)
@@ -286,7 +285,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read
     assert [one.line for one in findings if not one.agrees] == [5]
 
 
-@pytest.mark.parametrize("speed, start", [(3.0, 20.0), (-2.0, 80.0)])
+@mark.parametrize("speed, start", [(3.0, 20.0), (-2.0, 80.0)])
 def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
@@ -296,7 +295,7 @@ def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
 
-@pytest.mark.parametrize("times", [(0.0,), (0.1, 0.8)])
+@mark.parametrize("times", [(0.0,), (0.1, 0.8)])
 def test_times_that_nobody_rounded_leave_all_digits(times, read):
     theta, _, _, torque = follow_rise(np.array(times))
     rows = zip(times, np.degrees(theta), torque, strict=True)
@@ -332,7 +331,7 @@ def test_a_table_without_an_angle_names_the_commanded_one(read):
         read("torque\n1.0\n", "theta_4")
 
 
-@pytest.mark.parametrize("decimals, refused", [(1, True), (15, False)])
+@mark.parametrize("decimals, refused", [(1, True), (15, False)])
 def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, refused, read):
     law = fourbar.Sine(1.0, 0.5, 2.0 * math.pi, 1.0, 0.1 * math.pi)  # its peak: 0.2 s
     scene = crank_rocker(motion=Motion(law=law))

@@ -6,7 +6,7 @@ The unit of an error where nothing is allowed is tested too.
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import approx, mark
 
 from fourbar_validation.compare.compare import Errors, judge_errors
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
@@ -41,7 +41,7 @@ def judge_quantity(
     return judge_errors(errors, predicted)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "predicted, verdict, allowed",
     [
         (None, FAILS, ALLOWED),
@@ -57,7 +57,7 @@ def test_an_error_beyond_the_allowed_one_is_held_to_its_prediction(
     expected = None if predicted is None else np.array([0.0, predicted, 0.0])
     worst = judge_quantity(1e-15, 1e-12, 0.0, predicted=expected)
     assert (worst.position, worst.verdict) == (1, verdict)
-    assert worst.allowed == pytest.approx(allowed, abs=0)
+    assert worst.allowed == approx(allowed, abs=0)
 
 
 def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
@@ -69,7 +69,7 @@ def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
         assert worst.reason.startswith("NaN") == (verdict == FAILS)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "allowed, declared, verdict",
     [
         (0.049, K * LAST_DIGIT, FAILS),

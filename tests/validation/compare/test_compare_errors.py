@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
+from pytest import approx, importorskip, mark
 
 import fourbar
 from fourbar.quantities import PIN_FORCES
@@ -83,8 +83,8 @@ def test_an_answer_without_an_error_agrees_in_every_quantity():
     assert {*COMPARED_QUANTITIES, "closure", "assembled", "undecided"} == rows.keys()
 
 
-@pytest.mark.parametrize("place", (FIRST, MIDDLE, LAST))
-@pytest.mark.parametrize("name", ("theta_3", "omega_4", "alpha_3", "torque", "F12"))
+@mark.parametrize("place", (FIRST, MIDDLE, LAST))
+@mark.parametrize("name", ("theta_3", "omega_4", "alpha_3", "torque", "F12"))
 def test_an_error_at_any_position_fails_its_row_there(name, place):
     axes = ((place, 0), (place, 1)) if name in PIN_FORCES else (place,)
     for axis in axes:
@@ -93,7 +93,7 @@ def test_an_error_at_any_position_fails_its_row_there(name, place):
         assert rows[name].theta_2 == FORMULAS.theta_2[place]
 
 
-@pytest.mark.parametrize("factor", (0.2, 5.0))
+@mark.parametrize("factor", (0.2, 5.0))
 def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor):
     """Allowed of theta_3 are 50 eps over the condition of the position.
 
@@ -107,10 +107,10 @@ def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor):
     row = compare(answer)["theta_3"]
     assert row.failed == (factor > 1.0)
     if row.failed:
-        assert row.allowed == pytest.approx(allowed, rel=1e-6, abs=0)
+        assert row.allowed == approx(allowed, rel=1e-6, abs=0)
 
 
-@pytest.mark.parametrize("name", ("torque", "F14", "alpha_4"))
+@mark.parametrize("name", ("torque", "F14", "alpha_4"))
 def test_what_is_missing_or_no_number_where_the_loop_closes_fails(name):
     gone = compare(make_answer(**{name: None}))[name]
     assert gone.failed and gone.reason == "no answer"
@@ -134,10 +134,10 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
 def test_angles_that_do_not_close_the_loop_fail_beside_their_own_row():
     rows = compare(make_answer(theta_4=moved("theta_4", FIRST, 1e-10)))
     assert rows["closure"].failed
-    assert rows["closure"].allowed == pytest.approx(IDENTITY.factor, rel=1.0, abs=0)
+    assert rows["closure"].allowed == approx(IDENTITY.factor, rel=1.0, abs=0)
 
 
-@pytest.mark.parametrize("shrunk", ("formulas", "answer"))
+@mark.parametrize("shrunk", ("formulas", "answer"))
 def test_neither_side_chooses_what_it_is_allowed(shrunk):
     """A torque a millionth of the right one would have terms that cancel."""
     small = 1e-6 * np.asarray(FORMULAS.torque)
@@ -147,7 +147,7 @@ def test_neither_side_chooses_what_it_is_allowed(shrunk):
     assert row.failed and row.error > 0.9 and row.error / row.allowed > 1e12
 
 
-@pytest.mark.parametrize("left", (1e-1, 1e-2, 1e-4))
+@mark.parametrize("left", (1e-1, 1e-2, 1e-4))
 def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     """Sensitivities that predict an error hold the terms that cancel: predicted errors
     are not multiplied by them once more, which would excuse 1e-6.
@@ -162,7 +162,7 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     for name in ("torque", "F12", "alpha_4"):
         answer.quantities = right | {name: right[name] * (1.0 + 1e-9)}
         assert list_failing(compare(answer, scene, formulas)) == {name}
-    pytest.importorskip("flint")
+    importorskip("flint")
     answer.quantities = right | {"torque": right["torque"] * (1.0 + 1e-8)}
     predict = partial(predict_from_data, scene, formulas.at)
     rows = compare(
@@ -175,7 +175,7 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     assert list_failing(rows) == {"torque"}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "condition, names, hidden, whose, verdict",
     read_rows("""
 # no engine, however many quantities it answers, has digits to be judged by

@@ -4,7 +4,7 @@ Every pair of bars holds, faults show, who cannot do it says so.
 """
 
 import numpy as np
-import pytest
+from pytest import approx, mark, skip
 
 import fourbar
 from fourbar.effects import LinearDrive, Place
@@ -24,11 +24,11 @@ from tests.validation.engines.test_engines import driven
 EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
 
 
-@pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
-@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+@mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
+@mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
     if missing := engine.missing():
-        pytest.skip(missing)
+        skip(missing)
     at = crank_rocker(motion=fourbar.Motion(1.0))
     linkage, (theta_4,) = at.linkage, fourbar.solve(at, "position").theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
@@ -37,7 +37,7 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, ga
         motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
         drive=LinearDrive(near, Place(4, (0.2, 0.4))),
     )
-    assert fourbar.solve(scene, "position").stroke == pytest.approx(gap, rel=0.5)
+    assert fourbar.solve(scene, "position").stroke == approx(gap, rel=0.5)
     rows = judge_by(engine, scene)
     for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
         row = rows[quantity]
@@ -62,7 +62,7 @@ JUDGED = {
 """Pair of bars, motion, what acts, and quantities that agree besides."""
 
 
-@pytest.mark.parametrize("what", JUDGED)
+@mark.parametrize("what", JUDGED)
 def test_what_is_stated_of_a_line_is_judged(what):
     pair, motion, acting, quantities = JUDGED[what]
     scene = driven(*pair, 1, **{"effects": (fourbar.Gravity(),)} | acting)
@@ -72,7 +72,7 @@ def test_what_is_stated_of_a_line_is_judged(what):
     assert quantities <= agreeing and "torque" not in agreeing
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "answered, due",
     [
         ({"v_B"}, set()),

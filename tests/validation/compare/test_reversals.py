@@ -45,23 +45,13 @@ def test_only_a_pin_that_hardly_slips_reverses():
     dry = replace(scene("A"), motion=Motion(Sweep(0.1, 0.5, 4), 2.0))
     solved, ones = fourbar.solve(dry), np.ones(5)
 
-    def mark(omega_2, omega_3, omega_4, **how):
+    def find_reversals(omega_2, omega_3, omega_4, **how):
         speeds = {"omega_2": omega_2, "omega_3": omega_3, "omega_4": omega_4}
         solution = replace(solved, condition=ones, **speeds)
-        return mark_reversing(
-            dry,
-            solution,
-            slip,
-            **how,
-        ).tolist()
+        return mark_reversing(dry, solution, slip, **how).tolist()
 
-    reversing = mark(2.0 * ones, 2.0 + x, ones)
+    reversing = find_reversals(2.0 * ones, 2.0 + x, ones)
     assert reversing == [True, True, False, False, False]
     slow = np.array([1.0, 1.1e-6, 0.9e-6, 1e-3, 0.5])
-    at_rest = mark(
-        slow,
-        2.0 * slow,
-        slow,
-        in_time=True,
-    )
+    at_rest = find_reversals(slow, 2.0 * slow, slow, in_time=True)
     assert at_rest == [False, False, True, False, False]

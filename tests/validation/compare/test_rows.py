@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
+from pytest import mark, raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
@@ -83,7 +83,7 @@ three | b | torque | refuses | nan
     assert stated not in write_summary_page(summary_of(records[1:2]))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, sentence, status",
     read_rows("""
 2 agrees | All 2 comparisons hold: 2 agree | 0
@@ -113,12 +113,12 @@ def test_scenes_are_counted_and_a_row_passes_where_it_was_compared_and_holds():
     assert passing == {AGREES, DEGRADED}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "fields",
     [{"error": NAN}, {"verdict": DEGRADED, "error": NAN}, {"verdict": "passes"}],
 )
 def test_a_row_without_a_number_or_of_another_word_has_no_verdict(fields):
-    with pytest.raises(ValueError, match="no verdict"):
+    with raises(ValueError, match="no verdict"):
         changed(**fields)
 
 
@@ -146,7 +146,7 @@ WITHOUT_EFFECTS = [
 """What an answer says where nothing acts, and the row of the inertia alone."""
 
 
-@pytest.mark.parametrize("said, verdict, reason", WITHOUT_EFFECTS)
+@mark.parametrize("said, verdict, reason", WITHOUT_EFFECTS)
 def test_what_is_wrong_with_the_inertia_alone_is_a_row(said, verdict, reason):
     class WithoutEffects(Echo):
         def answer(self, scene, command):
@@ -199,7 +199,7 @@ def test_formulas_without_an_answer_fail():
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     tmp_path, monkeypatch, capsys
 ):
@@ -225,7 +225,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     assert status([*line, "free-body"]) == HOLDS
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_form_of_a_report_says_the_same_counts():
     """Rows of the formulas themselves are of both scenes, the others of free bodies."""
     refused = Engine("echo", partial(Echo, refuse), EQUIVALENCE)
@@ -282,7 +282,7 @@ def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
     assert told in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, capsys):
     cost = "fourbar_validation.cost."
     monkeypatch.setattr(f"{cost}work_precision.CostStudy.points", lambda _: iter(()))
@@ -302,7 +302,7 @@ def test_a_study_in_which_no_law_is_fitted_is_no_success(tmp_path, monkeypatch, 
         assert max(map(len, sentences.splitlines())) <= 80
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "error, allowed, mask, verdict, worst",
     read_rows("""
 0 2 1 | 2 |  | agrees | 1

@@ -6,7 +6,7 @@ What a size of nothing demands, and that what is no number is never small.
 import math
 
 import numpy as np
-import pytest
+from pytest import approx, mark
 
 import fourbar
 from fourbar_validation.compare.tolerance import (
@@ -27,7 +27,7 @@ from tests.support.rows import read_rows
 from tests.support.scenes import crank_rocker
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, ours, theirs, apart",
     [
         ("theta_3", math.pi - 0.25, -math.pi + 0.25, 0.5),
@@ -41,9 +41,9 @@ def test_angles_differ_modulo_a_turn_and_vectors_by_their_norm(
     name, ours, theirs, apart
 ):
     pair = np.array([ours]), np.array([theirs])
-    assert compute_difference(name, *pair) == pytest.approx([apart], rel=1e-15)
+    assert compute_difference(name, *pair) == approx([apart], rel=1e-15)
     error = find_error(name, *pair, np.array([10.0]))
-    assert error == pytest.approx(apart / 10.0)
+    assert error == approx(apart / 10.0)
 
 
 def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():
@@ -52,7 +52,7 @@ def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():
     assert divide(np.array([0.25]), replace_zero_size(np.zeros(1))) == 0.25
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "error, allowed, share",
     read_rows("""
 1 | 4 | 0.25
@@ -89,7 +89,7 @@ def test_conditions_of_several_quantities_are_those_of_their_units():
     np.testing.assert_allclose(found, [*wanted.values()], rtol=1e-15)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "bound, power",
     [(EQUIVALENCE, 1.0), (IDENTITY, 0.0), (SIMULATED, 0.0), (FULL_ACCURACY, 0.0)],
 )
@@ -97,7 +97,7 @@ def test_only_an_exact_comparison_is_allowed_more_as_the_condition_falls(bound, 
     condition = np.array([1.0, 0.125, 0.01])
     assert EQUIVALENCE.factor == IDENTITY.factor == 50.0 * 2.0**-52
     allowed = bound.factor / condition**power
-    assert bound.allowed(condition) == pytest.approx(allowed, rel=1e-12)
+    assert bound.allowed(condition) == approx(allowed, rel=1e-12)
 
 
 def test_only_a_loop_that_misses_by_its_rounding_touches():

@@ -11,9 +11,8 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
-from pytest import approx, raises
+from pytest import approx, mark, raises
 from scipy.interpolate import make_interp_spline
 
 import fourbar
@@ -65,8 +64,8 @@ def tried(scene):
     return error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "integrator, order, first",
     [("Euler", 1.0, 160), ("implicitfast", 1.0, 160), ("RK4", 4.0, 40)],
 )
@@ -84,7 +83,7 @@ def test_each_integrator_shows_its_order(integrator, order, first):
     assert abs(exponent - order) <= max(2.0 * sigma, laws.WITHIN), points
 
 
-@pytest.mark.slow
+@mark.slow
 def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
     plain = replace(BEST, pad=None, time_constant_steps=10.0)
     fast, slow = tried(turning()), tried(turning(0.1))
@@ -100,7 +99,7 @@ def test_softness_is_proportional_to_1_minus_d_and_sags_with_the_square_of_tc():
     assert fast(at_tc[2]).worst < 2.0 * fast(at_tc[1]).worst
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     made = work_precision.CostStudy("s", turning(), tmp_path)
     curves = {curve.name: curve for curve in work_precision.design_curves(turning())}
@@ -112,7 +111,7 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
     assert fine.force == approx(7e-3, rel=0.3)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
@@ -168,7 +167,7 @@ no longer the motion.
 """
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "jumping",
     [
         JUMPING,
@@ -250,7 +249,7 @@ def measure(scene, out, *options):
     return CliRunner().invoke(cost, line, standalone_mode=False)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     scene = tmp_path / "small.toml"
     scene.write_text(fourbar.dump(turning(positions=12)))
@@ -322,7 +321,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut():
     assert all(figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1 for box in boxes)
 
 
-@pytest.mark.parametrize("drive", slow_but({3}, [2, 3, 4, None]))
+@mark.parametrize("drive", slow_but({3}, [2, 3, 4, None]))
 def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     """More steps than positions of the scene are judged between the steps as well.
 
@@ -348,7 +347,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
     assert cost_point.seconds_per_revolution == approx(seconds, rel=1e-12)
 
 
-@pytest.mark.parametrize("drive, column", [(2, 1), (4, 3)])
+@mark.parametrize("drive, column", [(2, 1), (4, 3)])
 def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
     page = read("docs/cost.md")
     rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)

@@ -6,7 +6,7 @@ The points follow a stated law.
 import math
 from dataclasses import replace
 
-import pytest
+from pytest import approx, mark
 
 from fourbar_validation.advise.worst_errors import ERROR_NAMES
 from fourbar_validation.cost.conclusion import find_cheapest
@@ -21,12 +21,12 @@ from tests.support.costs import point
 STEPS = [40.0 * 2**k for k in range(6)]
 
 
-@pytest.mark.parametrize("order, holds", [(4.0, True), (3.8, True), (3.5, False)])
+@mark.parametrize("order, holds", [(4.0, True), (3.8, True), (3.5, False)])
 def test_a_law_holds_within_a_third_of_an_order(order, holds):
     ladder = [point(n, 1e-2 * (STEPS[0] / n) ** order) for n in STEPS]
     law, *others = fit_laws({"RK4, tc held": ladder})
     assert [one.quantity for one in (law, *others)] == list(ERROR_NAMES)
-    assert law.exponent == pytest.approx(order, abs=1e-6) and law.expected == 4.0
+    assert law.exponent == approx(order, abs=1e-6) and law.expected == 4.0
     assert law.decided and law.holds == holds == ("FAILS" not in str(law))
 
 
@@ -40,7 +40,7 @@ def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen():
     falling = [point(n, 1.0 / n) for n in STEPS]
     assert find_floor(falling, "torque") is None
     floored = [*falling, point(2560.0, 0.9 / STEPS[-1])]
-    assert find_floor(floored, "torque") == pytest.approx(0.9 / STEPS[-1])
+    assert find_floor(floored, "torque") == approx(0.9 / STEPS[-1])
     lost = [*falling, point(2560.0, math.inf)]
     assert find_floor(lost, "torque") is None
 

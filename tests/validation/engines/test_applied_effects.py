@@ -6,7 +6,7 @@ The run must catch the faults.
 from functools import cache
 
 import numpy as np
-import pytest
+from pytest import mark, param
 
 import fourbar
 from fourbar.effects import (
@@ -121,17 +121,17 @@ def test_every_effect_of_the_registry_is_here():
 ALONE = [(name,) for name in ACTING]
 
 
-@pytest.mark.parametrize("names", ALONE, ids="+".join)
+@mark.parametrize("names", ALONE, ids="+".join)
 def test_exact_engines_agree(names):
     assert outcome(scene(*names), EXACT) == ([], set())
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "names",
     [
         *ALONE,
         tuple(one for one in ACTING if one not in NO_COUNTERPART["mujoco-simulated"]),
-        pytest.param(tuple(ACTING), marks=pytest.mark.slow),
+        param(tuple(ACTING), marks=mark.slow),
     ],
     ids="+".join,
 )
@@ -171,7 +171,7 @@ class FaultyTree:
         self.tree.gravity((MORE * vector[0], MORE * vector[1]))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name",
     slow_but({"viscous", "load"}, [name for name in ACTING if name != "pin_friction"]),
 )
@@ -201,7 +201,7 @@ def test_what_the_formulas_make_of_a_spring_does_not_reach_the_engines(monkeypat
     assert fail_with("springs", ON_TREES)[0] >= ON_TREES
 
 
-@pytest.mark.parametrize("name", slow_but({"viscous", "load", "gravity"}, ACTING))
+@mark.parametrize("name", slow_but({"viscous", "load", "gravity"}, ACTING))
 def test_a_fault_in_the_engine_term_fails_the_run(name, monkeypatch):
     key = ACTING[name].key
     right = TERM_OF[key]

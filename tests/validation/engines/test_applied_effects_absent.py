@@ -4,7 +4,7 @@ Nothing of it in the formulas, in the MJCF or in the compiled model.
 """
 
 import mujoco
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar.mjcf import write_mjcf
@@ -17,7 +17,7 @@ from tests.validation.engines.test_applied_effects import ACTING
 BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, enabled, more_rows, tendons, actuators",
     read_rows("""
  | | 0 | 0 | 1
@@ -55,7 +55,7 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     assert not model.jnt_limited.any()
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "motion, note",
     [
         (

@@ -10,7 +10,7 @@ from itertools import combinations, product, starmap
 from typing import ClassVar
 
 import numpy as np
-import pytest
+from pytest import approx, mark, param
 
 import fourbar
 from fourbar.effects import (
@@ -101,10 +101,10 @@ def present(*names):
 
     def skip(engine):
         absent = bool(engine.library) and find_spec(engine.library) is None
-        return pytest.mark.skipif(absent, reason=str(engine.missing()))
+        return mark.skipif(absent, reason=str(engine.missing()))
 
-    some = [pytest.param(name, marks=skip(ENGINE[name])) for name in names]
-    return pytest.mark.parametrize("name", some)
+    some = [param(name, marks=skip(ENGINE[name])) for name in names]
+    return mark.parametrize("name", some)
 
 
 each_engine, each_tree = present(*BARS), present(*TREES)
@@ -176,7 +176,7 @@ FIGURES = {
 def test_thesis_figures(name):
     got = answered(name, thesis()).quantities
     for quantity, figure in FIGURES.items():
-        assert got[quantity][0] == pytest.approx(figure, abs=PRINTED, rel=0.0)
+        assert got[quantity][0] == approx(figure, abs=PRINTED, rel=0.0)
 
 
 def turn(lengths, **parts):
@@ -231,17 +231,17 @@ EVERY = {"mechanisms": 12, "random": 6, "force at a point": 12}
 RANDOM = Random(20, 3, tuple(DrawnType))
 
 
-@pytest.mark.slow
+@mark.slow
 @present(*BARS, "free-body")
-@pytest.mark.parametrize("kind", AGREEING)
+@mark.parametrize("kind", AGREEING)
 def test_agrees_to_round_off(name, kind):
     for case in AGREEING[kind]():
         assert failures(name, case, EVERY.get(kind, 1)) == []
 
 
 @each_engine
-@pytest.mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
-@pytest.mark.parametrize("branch", [1, -1])
+@mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
+@mark.parametrize("branch", [1, -1])
 def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
     for sign in (1, -1):
         answer = answered(name, at_limit(TRIPLE_ROCKER, sign * offset, branch))
@@ -254,7 +254,7 @@ def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
 
 
 @present(*TREES, "free-body")
-@pytest.mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4"])
+@mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4"])
 def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypatch):
     """And leave one that cannot close open."""
     for module, start in (
@@ -276,7 +276,7 @@ def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypa
 
 
 @present(*TREES, "free-body")
-@pytest.mark.parametrize(
+@mark.parametrize(
     "lengths, motion",
     [
         ((0.1, 0.1, 0.3, 0.3), {"theta_2": np.array([0.0, 1.0, 2.0, 3.0])}),
@@ -322,7 +322,7 @@ REFUSED = {
 
 
 @each_engine
-@pytest.mark.parametrize("number", [2, 3, 4])
+@mark.parametrize("number", [2, 3, 4])
 def test_bars_without_mass_or_inertia(name, number):
     """Exudyn and Pinocchio hold them.
 
@@ -445,8 +445,8 @@ def commanded(what, branch):
 
 
 @each_engine
-@pytest.mark.parametrize("what", COMMANDED)
-@pytest.mark.parametrize("branch", slow_but({-1}, [1, -1]))
+@mark.parametrize("what", COMMANDED)
+@mark.parametrize("branch", slow_but({-1}, [1, -1]))
 def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
     name, what, branch, monkeypatch
 ):
@@ -465,7 +465,7 @@ def test_an_engine_closes_its_own_loop_from_whatever_is_commanded(
 
 
 @each_engine
-@pytest.mark.parametrize("index", [63, 97])
+@mark.parametrize("index", [63, 97])
 def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     """The acceleration of A is judged by what bar 2 does alone.
 
@@ -476,7 +476,7 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     assert failures(name, case) == []
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "drive, mu, r, theta_2",
     [
         (4, 0.3, 0.1, 1.0891061452513966),
@@ -506,7 +506,7 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
         assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)
 
 
-@pytest.mark.parametrize("ground_angle", [0.0, 1.0, 2.5])
+@mark.parametrize("ground_angle", [0.0, 1.0, 2.5])
 def test_a_loop_that_just_closes_closes_however_the_ground_is_turned(ground_angle):
     """Its discriminant is 0 exactly.
 

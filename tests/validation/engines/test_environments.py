@@ -9,8 +9,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-import pytest
-from pytest import raises
+from pytest import MonkeyPatch, fixture, mark, raises
 
 import fourbar
 from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
@@ -44,7 +43,7 @@ class Toy:
 """
 
 
-@pytest.fixture(autouse=True)
+@fixture(autouse=True)
 def _ended():
     yield
     end_guests()
@@ -72,7 +71,7 @@ def write_wheel(folder, version, factor):
     return f"toy-engine @ {path.as_uri()}"
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def made_once():
     """Environments are made once and copied, without an index of packages."""
     ran, made = environments.run_to_end, []
@@ -94,14 +93,14 @@ def made_once():
         shutil.copytree(folder, made[0], symlinks=True)
         return ended
 
-    with pytest.MonkeyPatch.context() as patch:
+    with MonkeyPatch.context() as patch:
         patch.setenv("PIP_NO_INDEX", "1")
         patch.setattr(environments, "run_to_end", run)
         yield
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("made_once")
+@mark.slow
+@mark.usefixtures("made_once")
 def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
     monkeypatch.setattr(
         environments,
@@ -128,9 +127,9 @@ def test_two_versions_are_judged_side_by_side(tmp_path, monkeypatch):
     assert Path(python).is_relative_to(tmp_path / "cache")
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("made_once")
-@pytest.mark.parametrize(
+@mark.slow
+@mark.usefixtures("made_once")
+@mark.parametrize(
     "stated, words",
     [
         (
@@ -173,7 +172,7 @@ def test_an_environment_is_filled_by_its_own_pip(tmp_path, monkeypatch):
     assert filled[-2:] == ["install", "x"]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "text, words",
     read_rows("""
 [[engine] | is no TOML

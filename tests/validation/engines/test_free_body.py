@@ -4,8 +4,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-import pytest
-from pytest import approx
+from pytest import approx, mark
 
 import fourbar
 from fourbar.effects import Friction, Gravity, Load, Place, Spring, Springs, Torsion
@@ -35,7 +34,7 @@ def answered(scene):
     return answer.quantities
 
 
-@pytest.mark.parametrize("pin, begin", [("O4", 0.3), ("O2", 0.3 + 3.0 * math.tau)])
+@mark.parametrize("pin, begin", [("O4", 0.3), ("O2", 0.3 + 3.0 * math.tau)])
 def test_a_spring_is_wound_along_the_assembly_through_change_points(pin, begin):
     """Of a parallelogram bars 2 and 4 turn together: each winds by what bar 2 turns.
 
@@ -99,7 +98,7 @@ def test_at_rest_the_drive_takes_what_either_beginning_asks():
 NOTHING, LEFT, RIGHT = (0.0, 0.0), (-10.0, 0.0), (10.0, 0.0)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "drive, forces",
     [(2, (LEFT, RIGHT, RIGHT, NOTHING)), (4, (NOTHING, NOTHING, NOTHING, LEFT))],
 )
@@ -145,7 +144,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
     assert most > 1.0
 
 
-@pytest.mark.parametrize("key", ["viscous", "friction", "pin_friction"])
+@mark.parametrize("key", ["viscous", "friction", "pin_friction"])
 def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
     """Couple times slip at each pin, at every position.
 
@@ -167,7 +166,7 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
     assert more == approx(loss, abs=allowed, rel=0)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "F, C, x",
     read_rows("""
 1 | 0.5 | 2

@@ -10,7 +10,7 @@ import time
 from collections import defaultdict
 
 import numpy as np
-import pytest
+from pytest import fixture, importorskip, mark, param, raises, skip
 
 import fourbar
 from fourbar import Motion, Sweep
@@ -58,20 +58,20 @@ def place_of(text):
     return f"({FILE}, line {number})"
 
 
-@pytest.fixture(autouse=True)
+@fixture(autouse=True)
 def _ended():
     yield
     end_guests()
 
 
-@pytest.fixture
-def mark(tmp_path, monkeypatch):
+@fixture
+def sign(tmp_path, monkeypatch):
     """Marks the processes of a test, so that those that are left are found."""
     monkeypatch.setenv("MARK_OF_TEST", str(tmp_path))
     return f"MARK_OF_TEST={tmp_path}"
 
 
-@pytest.fixture
+@fixture
 def suite(tmp_path):
     fourbar.save(SCENE, tmp_path / "scene.toml")
     return read_scene_files([tmp_path / "scene.toml"])
@@ -103,10 +103,10 @@ def others_agree(by_engine):
     return all(verdicts(rows) == {AGREES} for rows in others)
 
 
-@pytest.mark.parametrize("language", slow_but({"python"}, ["python", "node"]))
+@mark.parametrize("language", slow_but({"python"}, ["python", "node"]))
 def test_a_program_in_any_language_agrees(language, tmp_path):
     if language == "node" and shutil.which("node") is None:
-        pytest.skip("no node")
+        skip("no node")
     in_node = language == "node"
     entry = f"node {SCRIPT}" if in_node else write_program(tmp_path, "plain")
     rows = judged(SCENE, entry)["plain"]
@@ -222,7 +222,7 @@ FINE = {
 }
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "errors, line",
     [
         (
@@ -261,10 +261,10 @@ def test_a_torque_that_is_a_hundredth_off_fails_alone(tmp_path):
     assert others_agree(by_engine)
 
 
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.timeout(300)
-def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark):
+@mark.slow
+@mark.linux
+@mark.timeout(300)
+def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, sign):
     monkeypatch.setattr(programs, "WORKER_MEMORY", 2 * 10**8)
     replaced = {name: pair for name, (pair, _) in PROGRAMS.items()} | FINE
     entries = [write_program(tmp_path, name, *pair) for name, pair in replaced.items()]
@@ -279,13 +279,13 @@ def test_whatever_a_program_does_costs_its_own_rows(tmp_path, monkeypatch, mark)
         assert verdict == FAILS and said.startswith(reason), (name, rows)
         assert "\n" not in said
     end_guests()
-    assert not list_processes(mark)
+    assert not list_processes(sign)
 
 
-@pytest.mark.slow
-@pytest.mark.linux
-@pytest.mark.timeout(120)
-def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, mark):
+@mark.slow
+@mark.linux
+@mark.timeout(120)
+def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, sign):
     """With what it started, and is not asked again for that scene."""
     monkeypatch.setattr(programs, "MOST_ERRORS", 10**7)
     entries = [write_program(tmp_path, name, *pair) for name, pair in SILENT.items()]
@@ -296,11 +296,11 @@ def test_a_program_that_is_silent_ends_at_its_limit(tmp_path, monkeypatch, mark)
         assert by_engine[name] == {"all": (FAILS, "no answer within 3 s")}
     said = by_engine["floods its errors"]["all"][1]
     assert said.startswith(("wrote more than", "no answer within"))
-    assert not list_processes(mark)
+    assert not list_processes(sign)
 
 
-@pytest.mark.linux
-@pytest.mark.slow
+@mark.linux
+@mark.slow
 def test_what_is_killed_from_outside_is_asked_again(tmp_path):
     """Once."""
     lives = tmp_path / "lives"
@@ -312,7 +312,7 @@ def test_what_is_killed_from_outside_is_asked_again(tmp_path):
     assert not lives.stat().st_size
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_class_has_a_process_of_its_own():
     """One of them changes the judge's verdicts, where it can import it."""
     by_engine = judged(SCENE, "Right", "Changes")
@@ -322,7 +322,7 @@ def test_a_class_has_a_process_of_its_own():
     assert by_engine["right"].keys() >= {*fourbar.quantities.UNKNOWNS, *derived}
 
 
-@pytest.mark.usefixtures("hosted")
+@mark.usefixtures("hosted")
 def test_what_a_class_answers_or_raises_is_said_in_a_line():
     names = "Angle Prints Empty Leaves Lacks Shapes Elsewhere Complex"
     by_engine = judged(SCENE, *names.split())
@@ -345,8 +345,8 @@ def test_what_a_class_answers_or_raises_is_said_in_a_line():
     }
 
 
-@pytest.mark.usefixtures("hosted")
-@pytest.mark.parametrize("scene", [ROCKING, STROKE], ids=["bar 4", "stroke"])
+@mark.usefixtures("hosted")
+@mark.parametrize("scene", [ROCKING, STROKE], ids=["bar 4", "stroke"])
 def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
     by_engine = judged(scene, "OfAnyBar", "Right")
     rows = by_engine["of any bar"]
@@ -355,7 +355,7 @@ def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
     assert by_engine["right"]["all"][0] == REFUSES
 
 
-@pytest.mark.usefixtures("hosted")
+@mark.usefixtures("hosted")
 def test_a_guest_is_not_asked_for_what_its_hello_leaves_out(tmp_path):
     motion = Motion(theta_3=Sweep(0.4, 0.8, 8), omega_3=3.0)
     rows = judged(crank_rocker(motion=motion), "OfAnyBar")["of any bar"]
@@ -365,7 +365,7 @@ def test_a_guest_is_not_asked_for_what_its_hello_leaves_out(tmp_path):
     assert loaded["all"] == (REFUSES, refusal)
 
 
-@pytest.mark.parametrize("acts", [None, "push"])
+@mark.parametrize("acts", [None, "push"])
 def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
     """Its hello names springs alone: those that act both ways it is asked as before."""
     hello = guests.Hello("sprung", effects=("springs",))
@@ -386,10 +386,10 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
     assert client._explain_refusal(sprung) == (missing if acts else "")
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("hosted")
+@mark.slow
+@mark.usefixtures("hosted")
 def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
-    pytest.importorskip("mujoco")
+    importorskip("mujoco")
     longest = "fourbar_validation.run.released.LONGEST_OF_A_GUEST"
     monkeypatch.setattr(longest, 1e-3)  # MuJoCo's here
     motion = Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
@@ -402,7 +402,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     assert {name: released[name] for name in ours} == ours
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "stated, names",
     read_rows("""
 wg 1.2 | wg
@@ -429,7 +429,7 @@ def test_a_version_stands_in_a_name_only_beside_another_one(stated, names, monke
     assert ", ".join(guest.start().name for guest in named) == names
 
 
-@pytest.mark.usefixtures("hosted")
+@mark.usefixtures("hosted")
 def test_names_stand_apart():
     """Of another engine, of two guests, and of those whose hello fails.
 
@@ -441,8 +441,8 @@ def test_names_stand_apart():
     assert names == ["free-body-2", "right", "right-2", "Nameless", "false", "sh"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "entry, part",
     read_rows("""
 no such program | the command line of a program that is there
@@ -452,14 +452,14 @@ tests.support.hostile_class:Absent | AttributeError
 """),
 )
 def test_what_is_not_there_is_refused_in_one_line(entry, part):
-    with pytest.raises(fourbar.InputError) as error:
+    with raises(fourbar.InputError) as error:
         select_engines(Request(guest=(entry,)))
     said = str(error.value)
     assert said.startswith("--guest = ") and part in said and "\n" not in said
 
 
-@pytest.mark.usefixtures("hosted")
-@pytest.mark.parametrize(
+@mark.usefixtures("hosted")
+@mark.parametrize(
     "name, reason",
     read_rows("""
 Nameless | engine
@@ -494,7 +494,7 @@ def answer(scene, at):
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_a_guest_prints_is_kept_beside_the_results(tmp_path, suite):
     printing = guests.read_guests([HERE + "Prints"], ())
     options = dict(workers=1, drawn=False)
@@ -503,7 +503,7 @@ def test_what_a_guest_prints_is_kept_beside_the_results(tmp_path, suite):
     assert "\\x1b]0;owned\\x07begin\nfrom a shell" in text
 
 
-@pytest.mark.slow
+@mark.slow
 def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suite):
     """Runs that are interrupted once the first part is there.
 
@@ -521,7 +521,7 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suit
 
     def run_once():
         heard, engines = Interrupting(), guests.read_guests(["mine:Mine", program], ())
-        with pytest.raises(KeyboardInterrupt):
+        with raises(KeyboardInterrupt):
             plan = Plan(suite, engines, drawn=False)
             run(plan, tmp_path / "out", heard)
         return heard.lines
@@ -542,19 +542,17 @@ SAME = ("setting", "assembled", "refusal", "alarms", "evidence", "quantities")
 SAME += ("predicted",)
 
 
-@pytest.mark.usefixtures("hosted")
-@pytest.mark.parametrize(
+@mark.usefixtures("hosted")
+@mark.parametrize(
     "engine",
     [
-        pytest.param(
-            engine, id=engine.name, marks=[pytest.mark.slow] * engine.through_time
-        )
+        param(engine, id=engine.name, marks=[mark.slow] * engine.through_time)
         for engine in (*ENGINES, *load_further())
     ],
 )
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
     if missing := engine.missing():
-        pytest.skip(missing)
+        skip(missing)
     program = guests.serve_adapter(engine.name, 120.0)
     outside = guests.GuestClient(engine.name, program, guests.ask_hello(program))
     inside = engine.start()

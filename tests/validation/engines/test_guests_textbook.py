@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-import pytest
+from pytest import fixture, importorskip, mark
 
 import fourbar
 from fourbar_validation.engines.guests import read_guests
@@ -14,7 +14,7 @@ from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 FILES = sorted(MODELS.glob("*.toml"))
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def engine():
     return read_guests(["tests.support.textbook:Textbook"], ())[0]
 
@@ -36,14 +36,14 @@ def check(engine, scene):
     return True
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+@mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_it_agrees_on_every_model(engine, file):
     assert check(engine, fourbar.load(file))
 
 
 def test_it_is_allowed_the_error_that_is_predicted_for_the_position(engine):
     """alpha_4 cancels 3500-fold, and with it a torque whose own terms do not."""
-    pytest.importorskip("flint")
+    importorskip("flint")
     question = make_question("uneven", draw_random_scene(73, 27, ()), (engine,))
     answer = question.answer(engine)
     for held, fails in ((engine, False), (replace(engine, predictor=None), True)):
@@ -51,7 +51,7 @@ def test_it_is_allowed_the_error_that_is_predicted_for_the_position(engine):
         assert any(row.failed for row in rows) == fails
 
 
-@pytest.mark.slow
+@mark.slow
 def test_it_agrees_on_a_hundred_random_scenes(engine):
     drawn = (draw_random_scene(993, i, tuple(DrawnType)) for i in range(100))
     assert sum(check(engine, scene) for scene in drawn) >= 65

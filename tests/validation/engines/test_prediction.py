@@ -7,7 +7,7 @@ import math
 
 import mpmath as mp
 import numpy as np
-import pytest
+from pytest import fixture, importorskip, mark
 
 import fourbar
 from fourbar.formulas.mobility import limit_positions
@@ -36,7 +36,7 @@ from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.judge_engines import compare_answer
 from tests.support.scenes import ON_COUPLER, crank_rocker, find_angle
 
-pytest.importorskip("flint")
+importorskip("flint")
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
 BOUNDED = ("theta_3", "theta_4", "B", "G3", "G4", "sin_mu", "condition")
 """What follows from the angles of bars 3 and 4 alone."""
@@ -55,7 +55,7 @@ def touch():
     return Scene(ROCKER, Motion(closed, 3.0))
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def question():
     """Ask nobody of a loop that just closes."""
     return make_question("scene", touch(), ())
@@ -69,7 +69,7 @@ ENGINE = Engine(
 )
 
 
-@pytest.mark.parametrize("quantity", ("A", "G2", "v_A", "omega_2", "B", "G4"))
+@mark.parametrize("quantity", ("A", "G2", "v_A", "omega_2", "B", "G4"))
 def test_a_place_that_is_wrong_by_a_half_fails_where_the_loop_just_closes(
     quantity, question
 ):
@@ -101,8 +101,8 @@ def test_what_the_input_decides_is_predicted_to_its_last_digits():
         assert np.isinf(predict_from_data(scene, command, quantity)).any()
 
 
-@pytest.mark.parametrize("stretched", (True, False))
-@pytest.mark.parametrize("b, c", ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
+@mark.parametrize("stretched", (True, False))
+@mark.parametrize("b, c", ((0.1, 0.22), (0.4, 0.07), (0.3, 1e-3)))
 def test_the_bound_of_the_angles_is_that_of_the_triangle(b, c, stretched):
     """Close a triangle that misses its line by the margin.
 
@@ -143,7 +143,7 @@ WHEEL_ON_COUPLER = Scene(
 )
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, scene",
     (
         ("pinocchio-inverse", UNEVEN),
@@ -157,7 +157,7 @@ def test_an_open_tree_of_uneven_bars_keeps_to_its_prediction(name, scene):
     Cramer's rule alone leaves them wrong by a hundred times what is predicted, and
     MuJoCo accelerates a wheel on the coupler with the crank and back again.
     """
-    pytest.importorskip(name.split("-", maxsplit=1)[0])
+    importorskip(name.split("-", maxsplit=1)[0])
     command = fourbar.command(scene)
     engine = list_engines()[name]
     answer = engine.start().answer(scene, command)

@@ -9,8 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
-from pytest import raises
+from pytest import mark, raises
 
 import fourbar
 from fourbar.errors import FourBarError, InputError
@@ -80,7 +79,7 @@ def same(one, two):
     return one == two
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_scene_and_command_comes_back_bit_for_bit():
     seen = 0
     for scene in scenes():
@@ -146,7 +145,7 @@ def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
     assert load["table"] == {"theta_2": [*table.theta_2], "factor": [1.0, 0.5, 1.0]}
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", ["crank_rocker", "gallery/excavator_bucket", "gallery/tailgate"]
 )
 def test_an_engine_answers_alike_from_both_ends(name):
@@ -283,7 +282,7 @@ answer | {"refusal": 3}
 """)
 
 
-@pytest.mark.parametrize("part, text", WRONG)
+@mark.parametrize("part, text", WRONG)
 def test_what_is_none_is_refused_in_one_line(part, text):
     data = json.loads(text.replace("MOVING", MOVING).replace("HUGE", "9" * 400))
     with raises(FourBarError) as raised:
@@ -291,7 +290,7 @@ def test_what_is_none_is_refused_in_one_line(part, text):
     assert str(raised.value) and "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     ("text",),
     read_rows("""
 []

@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 
-import pytest
+from pytest import fixture, importorskip, mark
 
 import fourbar
 from fourbar.effects import Gravity
@@ -35,7 +35,7 @@ SCHEMA = json.loads(read("docs/protocol.schema.json"))
 NAMED = (*sorted(MODELS.glob("*.toml")), *sorted(MODELS.glob("textbook/*.toml")))
 
 
-@pytest.fixture
+@fixture
 def engine(tmp_path):
     """The page's engine, as a reader saves it."""
     file = tmp_path / "engine.py"
@@ -71,7 +71,7 @@ def ask(engine, scene):
     return replies
 
 
-@pytest.mark.parametrize("file", NAMED, ids=lambda file: file.stem)
+@mark.parametrize("file", NAMED, ids=lambda file: file.stem)
 def test_the_page_s_engine_answers_what_the_formulas_do(engine, file):
     scene = fourbar.load(file)
     motion = scene.motion
@@ -99,14 +99,14 @@ def test_the_page_s_engine_answers_what_the_formulas_do(engine, file):
 
 
 def check(part):
-    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema = importorskip("jsonschema")
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     return jsonschema.Draft202012Validator(
         {"$ref": f"#/$defs/{part}", "$defs": SCHEMA["$defs"]}
     )
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_the_judge_writes_is_what_the_schema_says():
     seen, question = 0, check("question")
     for seen, scene in enumerate(scenes(), 1):
@@ -120,7 +120,7 @@ def test_what_the_judge_writes_is_what_the_schema_says():
     assert seen > 100
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_an_engine_writes_is_what_the_schema_says(engine):
     scene = crank_rocker(loads=())
     commanded = list_positions(scene)

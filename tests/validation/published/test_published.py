@@ -8,8 +8,8 @@ from collections import Counter
 from functools import cache
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
+from pytest import mark
 
 import fourbar
 from fourbar.quantities import UNKNOWNS
@@ -87,7 +87,7 @@ def test_rows_for_the_report():
     assert rows[-1][2:] == ("308.804407163", "161.418", "-156.506")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "printed, ours, noise, verdict",
     read_rows("""
 0.12 | 0.1249 | 0.0 | rounded
@@ -107,7 +107,7 @@ def test_verdicts(printed, ours, noise, verdict):
     assert compare_figure(printed, float(ours), float(noise)) == verdict
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_figure_is_compared():
     tables = Counter(figure.table for figure in list_all())
     assert tables == {
@@ -132,7 +132,7 @@ def test_every_figure_is_compared():
     assert verdicts == {"rounded": 1228, "truncated": 28, "differs": 60}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_every_difference_is_what_its_errata_make_of_ours():
     """Save three misprints, for which no computation is known.
 
@@ -287,7 +287,7 @@ def test_inputs_are_those_of_the_model():
         np.testing.assert_allclose(one[quantity], other[quantity], rtol=SPELLED)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_command_explains_every_difference():
     process = CliRunner().invoke(published, standalone_mode=False)
     assert process.return_value == 0

@@ -3,7 +3,7 @@ machine.
 """
 
 import numpy as np
-import pytest
+from pytest import approx, mark
 
 import fourbar
 from fourbar_validation.compare.rows import DEGRADED
@@ -21,7 +21,7 @@ from tests.support.scenes import recommand
 SUITE = read_default_suite()
 
 
-@pytest.mark.slow
+@mark.slow
 def test_nothing_got_worse_since_the_accepted_state():
     """Of prescribed motions; a released one is simulated.
 
@@ -49,7 +49,7 @@ def test_nothing_got_worse_since_the_accepted_state():
     assert not differences.regressed, render.write_differences(differences)
 
 
-@pytest.mark.parametrize("turns", [0, 800])
+@mark.parametrize("turns", [0, 800])
 def test_a_row_states_the_condition_that_its_allowance_comes_from(turns):
     """A move is distinguished from round-off by the condition."""
     name = "triple_rocker"
@@ -69,4 +69,4 @@ def test_a_row_states_the_condition_that_its_allowance_comes_from(turns):
         # what is degraded is held to what is computed for it: no law in the condition
         if row.verdict != DEGRADED:
             condition = min(1.0, K * EPS / row.allowed)
-            assert row.condition == pytest.approx(condition, rel=1e-9), row
+            assert row.condition == approx(condition, rel=1e-9), row

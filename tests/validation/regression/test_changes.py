@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from dataclasses import replace
 
-import pytest
+from pytest import fixture, mark
 
 from fourbar.errors import FAILED, HOLDS
 from fourbar_validation.compare.rows import FAILS, REFUSES
@@ -75,7 +75,7 @@ def make_row(word, error, allowed, condition=1, setting="exact", quantity="torqu
     return changed(**numbers, **named)
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def compared():
     """The runs that have all these rows, and an identity in each scene."""
     runs = ([], [])
@@ -87,7 +87,7 @@ def compared():
     return compare_made_here(*runs)
 
 
-@pytest.mark.parametrize("number", range(len(KINDS)))
+@mark.parametrize("number", range(len(KINDS)))
 def test_each_kind_of_change(number, compared):
     lines = compared.table[compared.table.scene == f"case {number}"]
     (kind,) = lines[lines.engine == "engine"].kind
@@ -125,7 +125,7 @@ def test_settings_are_paired_only_where_each_run_has_one_of_its_own():
     assert kinds([first, second], [third, second]) == [Kind.NOT_COMPARED, Kind.SAME]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "old, new, status",
     [
         ([ROW], [OTHER], FAILED),
@@ -178,7 +178,7 @@ def about(engines, **settings):
     )
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "old, new, pairs",
     read_rows("""
 wg=1 | wg=2 |

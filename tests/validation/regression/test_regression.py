@@ -15,8 +15,7 @@ from dataclasses import replace
 
 import pandas as pd
 import pyarrow.parquet as pq
-import pytest
-from pytest import raises
+from pytest import fixture, mark, raises
 
 import fourbar
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
@@ -68,7 +67,7 @@ MODEL = MODELS / "crank_rocker.toml"
 SCENE = fourbar.load(MODEL)
 
 
-@pytest.fixture
+@fixture
 def saved(tmp_path):
     """Writes a run with these rows into a folder of this name."""
 
@@ -78,7 +77,7 @@ def saved(tmp_path):
     return save
 
 
-@pytest.fixture
+@fixture
 def call(capsys):
     """Runs a command in this process: exit status, standard output, standard error."""
 
@@ -91,7 +90,7 @@ def call(capsys):
     return run
 
 
-@pytest.fixture
+@fixture
 def compare(call):
     """Compares two runs by the command: exit status, and the lines, unfolded."""
 
@@ -103,7 +102,7 @@ def compare(call):
     return run
 
 
-@pytest.fixture
+@fixture
 def accepts(tmp_path, call):
     """Accepts a run into the folder `kept` by the command, and returns its status."""
 
@@ -117,7 +116,7 @@ def read_files(folder):
     return {path: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_other_versions_are_reported():
     """Kernels that a processor is given are among them."""
     others = {"mujoco": "3.3.7", "cpu_features": "none", "blas_kernel": "Prescott"}
@@ -127,7 +126,7 @@ def test_other_versions_are_reported():
     assert "\nmujoco: 3.3.7 -> " in "\n" + render.write_differences(found)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_accept_keeps_the_run_next_to_the_results_or_in_a_stated_folder(
     tmp_path, saved, call
 ):
@@ -165,7 +164,7 @@ Without a pattern there is no such file.
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path, saved, call, accepts):
     rows = [changed(engine=f"engine {k}") for k in range(4)]
     good, run = (saved(name, *rows, times=TIMES) for name in ("good", "run"))
@@ -199,7 +198,7 @@ def test_a_damaged_run_is_named_and_nothing_is_written(tmp_path, saved, call, ac
     assert {call(*command)[0] for command in commands.values()} == {HOLDS}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_damaged_table_is_one_line_and_nothing_is_written(
     tmp_path, saved, call, accepts
 ):
@@ -229,7 +228,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
         assert read_files(kept) == before
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted(
     saved, compare, accepts
 ):
@@ -241,7 +240,7 @@ def test_what_has_no_record_of_its_rows_is_compared_with_a_note_and_not_accepted
     assert accepts(bare) == BAD_INPUT
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "rows, reason",
     [
         ([], "at least one comparison"),
@@ -266,7 +265,7 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(
             read_run(run)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "options, words",
     read_rows("""
 --type crank-rocker | say --random N too
@@ -364,7 +363,7 @@ formulas power | only the identities: the formulas, or what is stated of them
 """)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "worse, sentence",
     slow_but(AT_FAULT[:1], AT_FAULT),
 )
@@ -377,7 +376,7 @@ def test_the_report_says_who_is_at_fault(worse, sentence):
         assert sentence in html.unescape(form(changes))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     """One cause for all scenes, with the numbers of the worst."""
     old, new = disagreeing(["sim F12", "sim torque", "one torque"])
@@ -439,7 +438,7 @@ QUESTIONS = [
 """Scenes of a new run, fields of its row, why it is not compared, and what is told."""
 
 
-@pytest.mark.parametrize("scenes, fields, why, told", QUESTIONS)
+@mark.parametrize("scenes, fields, why, told", QUESTIONS)
 def test_rows_that_answer_another_question_are_named_first_and_not_compared(
     scenes, fields, why, told
 ):
@@ -458,7 +457,7 @@ def test_rows_that_answer_another_question_are_named_first_and_not_compared(
     assert compare_with(row).nothing
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_renamed_scene_is_found_by_what_it_states(saved, compare):
     heavier = weighted(0.05)
     both = []
@@ -515,7 +514,7 @@ RULES = [
 ]
 
 
-@pytest.mark.parametrize("old, new, what", RULES)
+@mark.parametrize("old, new, what", RULES)
 def test_each_entry_of_a_rule_can_weaken_it(old, new, what):
     weakened = rules.list_weakened(rules.list_rules([old]), rules.list_rules([new]))
     assert [weakening.what for weakening in weakened] == what
@@ -539,7 +538,7 @@ LOOSE = changed(
 )
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_wider_tolerance_is_a_regression_over_two_nights(
     tmp_path, saved, call, compare, accepts
 ):
@@ -590,7 +589,7 @@ def test_rows_whose_allowance_grew_are_told():
     assert not compare_made_here([ROW], [easier]).grown
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_run_of_another_suite_is_never_called_no_regression(saved, call):
     """Two of eight rows stand in both: the verdict says so before anything else."""
     both = [ROW, changed(quantity="F12")]
@@ -633,7 +632,7 @@ RUNS = [
 ]
 
 
-@pytest.fixture
+@fixture
 def nights(tmp_path, saved, accepts):
     """Accepts runs, the oldest first, and returns the folder that keeps them."""
 
@@ -652,7 +651,7 @@ def nights(tmp_path, saved, accepts):
     return accept_all
 
 
-@pytest.mark.slow
+@mark.slow
 def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
     tmp_path, nights, accepts
 ):
@@ -707,7 +706,7 @@ held silent | silent | has not answered since {runs[1]}; it answered in {runs[0]
 """A row of each accepted run, one of a later run, and what is said of it."""
 
 
-@pytest.mark.parametrize("runs, failure, words", SINCE)
+@mark.parametrize("runs, failure, words", SINCE)
 def test_a_failure_is_looked_up_in_the_accepted_runs(
     runs, failure, words, tmp_path, nights
 ):
@@ -721,7 +720,7 @@ def test_a_failure_is_looked_up_in_the_accepted_runs(
         assert since == words.format(before=run.describe(), runs=RUNS)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     tmp_path, monkeypatch, call
 ):
@@ -750,7 +749,7 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
         read_scene_files([files[0], files[-1]])
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name", ["lock", "run.json", TABLE, TIMINGS, "report.html", ABOUT, HISTORY]
 )
 def test_a_folder_where_a_file_belongs_is_one_line_and_nothing_is_written(
@@ -783,7 +782,7 @@ def test_a_full_disk_names_the_file_that_does_not_fit(tmp_path, monkeypatch, sav
     assert caught.value.filename2 is None
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_is_too_long_for_a_text_and_a_history_is_compared_and_accepted(
     tmp_path, monkeypatch, compare, accepts
 ):

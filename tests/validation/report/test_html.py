@@ -7,18 +7,18 @@ import base64
 import gzip
 import json
 
-import pytest
+from pytest import importorskip, mark
 
 from fourbar_validation.compare.rows import write_rows
 from fourbar_validation.report.html import ALL_OPEN
 from tests.support.checkout import read
 from tests.validation.report.test_report import copies, report
 
-pytest.importorskip(
+importorskip(
     "selenium",
     reason="pages are driven by selenium: pip install selenium",
 )
-pytestmark = pytest.mark.slow
+pytestmark = mark.slow
 
 CONTRAST = 4.5
 """WCAG 2.1, level AA, for text."""
@@ -83,7 +83,7 @@ def require_contrast(driver):
     assert worst[0][0] >= CONTRAST, worst
 
 
-@pytest.mark.parametrize("dark", [False, True])
+@mark.parametrize("dark", [False, True])
 def test_all_text_is_readable(browse, dark):
     """Also in the matrix of the benchmark, with its grounds of green, yellow and red.
 
@@ -97,7 +97,7 @@ def test_all_text_is_readable(browse, dark):
     require_contrast(browse(page[: page.index("</table>")], dark=dark))
 
 
-@pytest.mark.parametrize("count", [2, ALL_OPEN + 2])
+@mark.parametrize("count", [2, ALL_OPEN + 2])
 def test_a_number_leads_to_its_row(browse, count):
     driver = browse(report(copies(count))[1])
     link = driver.find_elements("css selector", "#overview ~ details td.cell a")[-1]

@@ -4,7 +4,7 @@ import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
-import pytest
+from pytest import approx, mark
 
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.report.junit import list_cases, write_document
@@ -26,7 +26,7 @@ def record(*rows):
     return Record("scene", title="Scene", rows=list(rows))
 
 
-@pytest.mark.parametrize("verdict", OUTCOMES)
+@mark.parametrize("verdict", OUTCOMES)
 def test_a_verdict_is_its_outcome(verdict):
     (case,) = list_cases([replace(ROW, verdict=verdict)])
     assert case.outcome == OUTCOMES[verdict]
@@ -70,10 +70,10 @@ def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
 
 def test_a_missing_answer_uses_all_that_is_allowed():
     missing = replace(ROW, verdict=FAILS, error=math.nan)
-    assert [ROW.used, missing.used] == pytest.approx([0.1, math.inf])
+    assert [ROW.used, missing.used] == approx([0.1, math.inf])
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "rows, good",
     [
         ((ROW,), True),

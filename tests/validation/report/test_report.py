@@ -17,7 +17,7 @@ from importlib import import_module
 from itertools import accumulate
 
 import numpy as np
-import pytest
+from pytest import approx, fixture, mark
 
 import fourbar
 from fourbar import Free, Motion, Sweep
@@ -101,8 +101,8 @@ def unpacked(text):
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [2, ALL_OPEN + 1])
+@mark.slow
+@mark.parametrize("count", [2, ALL_OPEN + 1])
 def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(count):
     pages = copies(count, failing=1)
     text = unpacked(report(pages)[1])
@@ -121,7 +121,7 @@ def test_every_link_leads_to_a_row_and_the_row_says_what_results_csv_says_there(
     assert linked <= {int(line) for line in rows} and len(linked) > 20 * count
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
     summary, text = report(copies(3, failing=1))
     assert summary.headline.startswith("FAILS: ")
@@ -132,7 +132,7 @@ def test_the_verdict_stands_first_and_a_failure_is_named_before_anything_else():
     assert "What fails</h2>" not in report(copies(3))[1]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_nothing_is_fetched_and_a_section_of_another_module_is_linked():
     section = Section("hard", "Hard cases", "As predicted.", ["family"], [["toggle"]])
     _, text = report(copies(2), sections=[section])
@@ -143,7 +143,7 @@ def test_nothing_is_fetched_and_a_section_of_another_module_is_linked():
     assert "url(" not in re.sub(r"url\(#", "", text) and "@import" not in text
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_comment_of_a_pull_request_holds_200_scenes_that_all_fail():
     assert len(write_summary_page(summary_of(copies(200, failing=200)))) < COMMENT_LIMIT
 
@@ -162,7 +162,7 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches():
     assert len(find_worst_of_segments(np.array([LEAST_DRAWN_ERROR]), 0.5)) == 1
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_times_of_engines_are_those_of_the_run():
     """The median over scenes.
 
@@ -180,9 +180,9 @@ def test_the_times_of_engines_are_those_of_the_run():
     page = unescape(report(scenes)[1])
     for engine, taken in seconds.items():
         line = lines[engine]
-        assert line.microseconds == pytest.approx(2.0 * 1e6 * taken / 37, rel=1e-12)
+        assert line.microseconds == approx(2.0 * 1e6 * taken / 37, rel=1e-12)
         times = taken / seconds["formulas"]
-        assert line.times_formulas == pytest.approx(times, rel=1e-12)
+        assert line.times_formulas == approx(times, rel=1e-12)
         assert WORK[engine] in page
     refused = replace(bare.rows[0], engine="free-body", verdict=REFUSES)
     silent = summary_of([replace(bare, rows=[*bare.rows, refused])])
@@ -190,8 +190,8 @@ def test_the_times_of_engines_are_those_of_the_run():
     assert math.isnan(line.microseconds)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
+@mark.slow
+@mark.parametrize(
     "motion, pictures, drawn",
     [
         (Motion(Sweep(0.0, 6.0, 24)), 3, ["free-body"]),
@@ -215,7 +215,7 @@ def test_an_engine_that_is_missing_is_reported_as_failing():
     assert "What fails</h2>" in text and "No module named" in text and ">inf<" in text
 
 
-@pytest.mark.slow
+@mark.slow
 def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     monkeypatch.setattr("fourbar_validation.report.run_summary.SCENES_SHOWN", 20)
     pages = copies(100)
@@ -242,7 +242,7 @@ def test_many_scenes_give_a_short_report_of_the_worst(monkeypatch):
     assert len(text) < 1.0e6
 
 
-@pytest.fixture
+@fixture
 def printed(tmp_path, capsys):
     """Prints the table of a run, and returns its text."""
 
@@ -254,7 +254,7 @@ def printed(tmp_path, capsys):
     return print_run
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "error, allowed, cell",
     [(2.5e-7, 1e-5, "2.5e-07 of 1e-05"), (1.16e-9, 1.28e-9, "1.2e-09 of 1.3e-09")],
 )
@@ -359,7 +359,7 @@ def draw_answer(*rows, **numbers):
     return draw_scene_figure(record) or ""
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
     row = mine(quantity="F43", error=2.0, allowed=1e-6, verdict=FAILS)
@@ -405,7 +405,7 @@ CAUSES = [
 ]
 
 
-@pytest.mark.parametrize("wrong, words", CAUSES)
+@mark.parametrize("wrong, words", CAUSES)
 def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
     wrong, words
 ):
@@ -437,7 +437,7 @@ NAMED = fail(mine(engine="named", quantity="F12"))
 ALONE_TOO = replace(ALONE, engine="two")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "rows, against, wrong",
     [
         ([], {"alpha_3": ["mine", "two"]}, {FORMULAS}),
@@ -475,7 +475,7 @@ def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
     assert summary_of([record_of("a", [DEAD])]).headline == f"FAILS: {words}"
 
 
-@pytest.mark.parametrize("row, pictured", [(fail(OF_MINE), 30), (OF_MINE, PICTURED)])
+@mark.parametrize("row, pictured", [(fail(OF_MINE), 30), (OF_MINE, PICTURED)])
 def test_all_scenes_that_fail_have_pictures_and_some_that_hold(row, pictured):
     summary = summary_of(record_of(f"s{k}", [row]) for k in range(30))
     assert len(summary.pictured) == pictured
@@ -499,7 +499,7 @@ def test_a_reason_keeps_its_numbers_and_counts_those_like_it():
         assert [*summary.silent.values()] == [f"theirs: nothing compared {words}"]
 
 
-@pytest.mark.parametrize("pictures", [1, 2, 3])
+@mark.parametrize("pictures", [1, 2, 3])
 def test_the_first_two_pictures_of_a_scene_are_shown_small_too(pictures):
     """Of a single position there is the linkage alone."""
     figure = "".join(f"<svg>p{number}</svg>\n" for number in range(pictures))
@@ -517,7 +517,7 @@ def test_an_engine_that_drew_nothing_is_not_in_the_caption_of_a_picture():
     assert "free-body" in caption and "theirs" not in caption
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "verdict, reason, kind",
     [
         (REFUSES, "nothing acts", "at declared limits of an engine"),
@@ -545,7 +545,7 @@ def test_a_weaker_rule_stands_before_a_verdict_that_holds():
     )
 
 
-@pytest.mark.parametrize("declared, confirmed", [(1e-4, 1), (1.1e-4, 0)])
+@mark.parametrize("declared, confirmed", [(1e-4, 1), (1.1e-4, 0)])
 def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     declared, confirmed
 ):
@@ -569,8 +569,8 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     assert any(note.startswith(words) for note in overview.notes)
 
 
-@pytest.mark.parametrize("columns", ["80", "40"])
-@pytest.mark.parametrize("theta_2, at", [(0.5, "28.6"), (math.nan, "-")])
+@mark.parametrize("columns", ["80", "40"])
+@mark.parametrize("theta_2, at", [(0.5, "28.6"), (math.nan, "-")])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
     columns, theta_2, at, monkeypatch, printed
 ):
@@ -584,7 +584,7 @@ def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whol
     assert " ".join(shown).split() == cells
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_picture_shows_the_pin_force_that_fails():
     """Without a failure it shows the largest."""
     sizes = {name: magnitude(SOLUTION[name]).max() for name in PIN_FORCES}

@@ -11,7 +11,7 @@ from functools import partial
 from itertools import cycle
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar import (
@@ -216,7 +216,7 @@ DRIVEN = {
 """The engine's text where the drive is on bar 3 or 4."""
 
 
-@pytest.mark.parametrize("bar", DRIVEN)
+@mark.parametrize("bar", DRIVEN)
 def test_a_mistake_is_named_wherever_the_drive_acts(bar):
     scene = replace(SCENE, drive_bar=bar)
     right = DRIVEN[bar]
@@ -229,7 +229,7 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar):
         assert find_causes(guest, scene)[0] == words
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "cut, bar, joint, behind",
     [("A", 3, "B", (3,)), ("O4", 4, "B", (4,)), ("O4", 3, "A", (3, 4))],
 )
@@ -267,8 +267,8 @@ def find_causes(guest, scene=SCENE):
     return [cause.removesuffix(", all else agrees") for cause in causes]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("text", BUGS)
+@mark.slow
+@mark.parametrize("text", BUGS)
 def test_a_mistake_is_named_first(text):
     bug = BUGS[text]
     found = find_causes_of(bug) if callable(bug) else find_causes(make_guest(*bug))
@@ -336,7 +336,7 @@ HARD_TO_EXPLAIN = {
 }
 
 
-@pytest.mark.parametrize("name", HARD_TO_EXPLAIN)
+@mark.parametrize("name", HARD_TO_EXPLAIN)
 def test_what_nothing_explains_fails_by_its_numbers_under_every_command(name):
     """Mistakes that are tried in vain, as a zero that is elsewhere, hide no number."""
 
@@ -360,7 +360,7 @@ def test_mistakes_in_several_columns_are_named_together():
     assert causes[0] == f"{of_F43}; x reversed: F12"
 
 
-@pytest.mark.parametrize("spoiled", [["alpha_3"], ["alpha_3", "a_G3"]])
+@mark.parametrize("spoiled", [["alpha_3"], ["alpha_3", "a_G3"]])
 def test_a_mistake_that_explains_less_than_nine_tenths_is_not_named(spoiled):
     """The other branch changes fewer than twenty quantities."""
 
@@ -376,7 +376,7 @@ def test_a_mistake_that_explains_less_than_nine_tenths_is_not_named(spoiled):
     assert causes == (named if len(spoiled) == 1 else [])
 
 
-@pytest.mark.parametrize("name", HARD_TO_EXPLAIN)
+@mark.parametrize("name", HARD_TO_EXPLAIN)
 def test_a_sign_is_named_under_every_command_and_at_change_points(name):
     causes = find_causes_of(reverse_F43, HARD_TO_EXPLAIN[name])
     assert causes == ["sign reversed, or F_ij given for F_ji: F43"]
@@ -405,7 +405,7 @@ def test_a_mistake_of_the_inertia_alone_is_said_to_be_there():
     assert cause == words
 
 
-@pytest.mark.parametrize("name", ["stroke_output", "cylinder_2_3", "push_output"])
+@mark.parametrize("name", ["stroke_output", "cylinder_2_3", "push_output"])
 def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     """The weight of the coupler is what the balances with and without it differ by."""
     scene = fourbar.load(CAPABILITIES / f"{name}.toml")
@@ -479,8 +479,8 @@ ACTING = {
 DONE = {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name, word", list(zip(ACTING, cycle(DONE))))
+@mark.slow
+@mark.parametrize("name, word", list(zip(ACTING, cycle(DONE))))
 def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
     bare = replace(SCENE, effects=(Gravity(),))
     acting, *left = ACTING[name]
@@ -624,13 +624,13 @@ OTHER_SCENES = {
 """Scene, the one that is solved in its place, and the factor on what differs."""
 
 
-@pytest.mark.parametrize("words", OTHER_SCENES)
+@mark.parametrize("words", OTHER_SCENES)
 def test_another_scene_of_an_adversary_is_named_first(words):
     scene, other, *factor = OTHER_SCENES[words]
     assert find_causes_of(scale(other, *factor), scene)[0] == words
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "names, where",
     [  # osrf/drcsim#193: the wrench of the constraints alone
         (PIN_FORCES, "in the pin forces alone"),
@@ -681,7 +681,7 @@ def test_two_engines_that_agree_with_each_other_blame_the_formulas_alone():
     assert name_wrong(missed, declared).keys() == twice.keys()
 
 
-@pytest.mark.parametrize("quantity", ["v_G3", "assembled"])
+@mark.parametrize("quantity", ["v_G3", "assembled"])
 def test_what_follows_from_two_answers_alike_is_no_fault_of_theirs(quantity):
     class Alike(Altered):
         def answer(self, scene, at):

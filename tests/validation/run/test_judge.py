@@ -6,7 +6,7 @@ Silence, NaN and breakdowns must cost the run.
 from functools import partial
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar import Bar, FourBar, Friction, Motion, uniform
@@ -107,7 +107,7 @@ def test_angles_close_the_loop_to_what_their_engine_declares():
     assert not [row for row in rows.values() if row.failed]
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "spoil, failing",
     [(turn, ["closure", "theta_3"]), (open_loop, ["assembled"])],
 )
@@ -245,8 +245,8 @@ WITHHELD = {
 """Scene and why its forces are no answer; its motion is judged."""
 
 
-@pytest.mark.parametrize("spoil", [echo, answer_anyway])
-@pytest.mark.parametrize("what", WITHHELD)
+@mark.parametrize("spoil", [echo, answer_anyway])
+@mark.parametrize("what", WITHHELD)
 def test_an_answer_that_the_formulas_withhold_is_not_compared(what, spoil):
     """No agreement, whatever the engine says."""
     scene, reason = WITHHELD[what]
@@ -308,7 +308,7 @@ def test_a_check_that_raises_costs_its_own_rows_alone(monkeypatch):
     assert len(all_rows) > 3
 
 
-@pytest.mark.parametrize("compares", [False, True])
+@mark.parametrize("compares", [False, True])
 def test_a_check_says_itself_whether_it_is_a_comparison(compares, monkeypatch):
     """A name of its own makes no comparison of it, and an empty run does not pass."""
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from pytest import importorskip, mark
 
 from fourbar.effects import Gravity, PinFriction
 from fourbar.formulas.mobility import TURN
@@ -64,12 +64,12 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+@mark.parametrize("name", SCENES)
 def test_engines_that_are_right_raise_no_alarm(name):
     assert not list_failed(SCENES[name], EXACT)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_ratios_over_ten_decades_raise_no_alarm():
     """As `run --random N --type uneven`.
 
@@ -85,7 +85,7 @@ def test_ratios_over_ten_decades_raise_no_alarm():
         assert not list_failed(scene, EXACT)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "why, seed, index",
     read_rows("""
 bar 3 passes mjMAXVAL | 36 | 13
@@ -103,7 +103,7 @@ def test_a_simulation_of_uneven_bars_raises_no_alarm(why, seed, index):
     assert not list_failed(scene, THROUGH_TIME)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "library, name, drawn",
     [
         ("opensim", "opensim-constraints", (3, 19)),
@@ -111,13 +111,13 @@ def test_a_simulation_of_uneven_bars_raises_no_alarm(why, seed, index):
     ],
 )
 def test_a_large_acceleration_and_a_light_crank_raise_no_alarm(library, name, drawn):
-    pytest.importorskip(library)
+    importorskip(library)
     engine = list_engines()[name]
-    pytest.importorskip(engine.library)
+    importorskip(engine.library)
     assert not list_failed(draw_random_scene(*drawn, ()), [engine])
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_free_motion_near_a_limit_raises_no_alarm(monkeypatch):
     """The engines get theta_2, omega_2 and alpha_2 of the independent theta_4, rounded.
 
@@ -162,13 +162,13 @@ class AMillionthOff(AboutCentres):
         return answer
 
 
-@pytest.mark.slow
+@mark.slow
 def test_moments_about_far_centres_are_right_to_full_accuracy():
     """The digits that such a method loses are computed.
 
     The reason says for which.
     """
-    pytest.importorskip("flint")
+    importorskip("flint")
     suite = Hard()
     names = [suite.name(index) for index in range(len(suite))]
     far = [
@@ -214,7 +214,7 @@ def draw_table(rng, ends):
     return Law(time=time, theta_2=tuple(angles.tolist()), ends=ends)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "draw, kind",
     [
         (draw_table, "free"),
@@ -232,7 +232,7 @@ def test_a_right_law_is_right_at_every_step(draw, kind):
         assert not row.failed, row
 
 
-@pytest.mark.parametrize("ends", ["free", "rest", "periodic"])
+@mark.parametrize("ends", ["free", "rest", "periodic"])
 def test_a_wrong_acceleration_along_a_table_of_uneven_steps_is_none_of_the_law(
     ends, monkeypatch
 ):
@@ -252,7 +252,7 @@ def test_a_wrong_acceleration_along_a_table_of_uneven_steps_is_none_of_the_law(
     assert judge_law(law).failed
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "ends, other", [("rest", "free"), ("free", "rest"), ("periodic", "free")]
 )
 def test_a_spline_with_other_ends_is_not_the_law(ends, other, monkeypatch):

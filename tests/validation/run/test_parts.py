@@ -8,7 +8,7 @@ import json
 import shutil
 from pathlib import Path
 
-import pytest
+from pytest import MonkeyPatch, fixture, mark, raises
 
 from fourbar.errors import BAD_INPUT, HOLDS, InputError
 from fourbar_validation.cli import status
@@ -21,14 +21,14 @@ from tests.support.here import judge_here
 OPTIONS = ["--random", "7", "--engines", "free-body", "--no-pictures"]
 
 
-@pytest.fixture(autouse=True)
+@fixture(autouse=True)
 def small_tasks(monkeypatch):
     """Two scenes a task, judged in this process."""
     judge_here(monkeypatch)
     monkeypatch.setattr(plan, "SCENES_OF_A_QUICK_TASK", 2)
 
 
-@pytest.fixture
+@fixture
 def run(tmp_path):
     """Judges a part, or all, into a folder of this name, and returns the folder."""
 
@@ -40,7 +40,7 @@ def run(tmp_path):
     return judge
 
 
-@pytest.fixture
+@fixture
 def parts(run):
     """The folders of three parts.
 
@@ -53,14 +53,14 @@ def judge_nothing(job):
     raise AssertionError(f"{job} was judged again")
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_run_over_all_parts_in_one_folder_writes_the_report(run):
     """In the bytes of a whole run; it judges nothing again."""
     for k in (2, 1):
         out = Path(run("out", "--part", f"{k}/2"))
         assert not (out / "results.csv").exists()
     assert len(list((out / "parts").iterdir())) == 4
-    with pytest.MonkeyPatch.context() as patch:
+    with MonkeyPatch.context() as patch:
         patch.setattr("fourbar_validation.run.plan.judge_job", judge_nothing)
         run("out")
     assert not (out / "request.json").exists() and not (out / "parts").exists()
@@ -70,7 +70,7 @@ def test_a_run_over_all_parts_in_one_folder_writes_the_report(run):
         assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 
-@pytest.fixture
+@fixture
 def refusal(tmp_path, capsys):
     """Collects folders, and returns the line with which that is refused."""
 
@@ -82,7 +82,7 @@ def refusal(tmp_path, capsys):
     return collect
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_is_missing_is_named_by_its_part(parts, tmp_path, refusal):
     said = refusal(parts[0], parts[2])
     assert "1 of 4 tasks are missing: run --part 2/3 again" in said
@@ -103,7 +103,7 @@ def test_parts_of_another_run_are_refused(parts, run, refusal):
     assert "it differs in code" in refusal(*parts)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_of_two_copies_of_a_part_one_that_is_whole_is_enough(parts, run, tmp_path):
     copy = run("copy", "--part", "2/3")  # in other times
     (task,) = Path(copy, "parts").iterdir()
@@ -112,7 +112,7 @@ def test_of_two_copies_of_a_part_one_that_is_whole_is_enough(parts, run, tmp_pat
     assert status(["collect", copy, *parts, *out]) == HOLDS
 
 
-@pytest.mark.slow
+@mark.slow
 def test_two_copies_of_a_part_that_differ_are_refused(
     parts, run, tmp_path, monkeypatch, refusal
 ):
@@ -142,7 +142,7 @@ def test_a_resumed_run_says_which_answers_it_keeps(run, capsys):
     assert "scenes, random-0-000000000, random-0-000000001, random-0-000000006" in said
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_is_no_folder_of_a_part_is_refused(parts, tmp_path, refusal):
     assert "must be a folder that `run --part` wrote" in refusal(str(tmp_path))
     said = refusal(*parts, out=parts[1])
@@ -151,7 +151,7 @@ def test_what_is_no_folder_of_a_part_is_refused(parts, tmp_path, refusal):
     assert "must be a folder that `run --part` wrote" in refusal(*parts)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     scene = tmp_path / "models" / "mine.toml"
     scene.parent.mkdir()
@@ -164,12 +164,10 @@ def test_scene_files_need_not_be_where_parts_are_collected(tmp_path):
     assert (out / "results.csv").read_text().count("\nmine,") > 20
 
 
-@pytest.mark.parametrize(
-    "text", ["0/3", "4/3", "1", "1/", "a/b", "-1/3", "1/0", "1.5/3"]
-)
+@mark.parametrize("text", ["0/3", "4/3", "1", "1/", "a/b", "-1/3", "1/0", "1.5/3"])
 def test_a_part_is_k_of_n(text):
     assert read_part("2/3") == (2, 3)
-    with pytest.raises(InputError, match="must be K/N"):
+    with raises(InputError, match="must be K/N"):
         read_part(text)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
+from pytest import mark
 
 from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, uniform
 from fourbar.scene import Scene
@@ -92,8 +92,8 @@ def test_engines_that_agree_on_a_released_linkage_against_fourbar_name_it():
     assert failed == question.against.keys() == {"F14"}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("coupler", [0.12, 0.15])
+@mark.slow
+@mark.parametrize("coupler", [0.12, 0.15])
 def test_every_engine_is_judged_through_limits_and_change_points(coupler):
     scene = falling(coupler)
     solution = solve(scene)
@@ -120,7 +120,7 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
 
 
-@pytest.mark.parametrize("branch", [1, -1])
+@mark.parametrize("branch", [1, -1])
 def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_stands(
     branch,
 ):
@@ -140,7 +140,7 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     assert [row for row in rows if row.verdict == FAILS] == []
 
 
-@pytest.mark.parametrize("bar", ["coupler", "output"])
+@mark.parametrize("bar", ["coupler", "output"])
 def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     scene = falling()
     massless = Bar(getattr(scene.linkage, bar).length)
@@ -161,7 +161,7 @@ def answering(monkeypatch, change):
     return [row for row in rows if row.engine == "pinocchio-forward"]
 
 
-@pytest.mark.slow
+@mark.slow
 def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(monkeypatch):
     def cut(answer):
         names = ("theta_2", "omega_2", "energy")
@@ -182,7 +182,7 @@ def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(monkeypatch):
         assert row(rows, "pinocchio-forward", "theta_2").verdict == FAILS
 
 
-@pytest.mark.slow
+@mark.slow
 def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
     """Released from rest by a couple alone.
 
@@ -196,7 +196,7 @@ def test_an_engine_is_run_at_twice_its_step_however_close_the_instants_are():
         assert energy.verdict == DEGRADED and energy.error < 1e-3, energy
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "off, verdict",
     [((3.0, 5.0), UNDECIDED), ((np.inf, 5.0), FAILS), ((3.0, np.inf), FAILS)],
 )
@@ -214,7 +214,7 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
     assert row(rows, "pinocchio-forward", "theta_2").verdict == verdict
 
 
-@pytest.mark.parametrize("declared, verdict", [(1e-3, AGREES), (1e-5, FAILS)])
+@mark.parametrize("declared, verdict", [(1e-3, AGREES), (1e-5, FAILS)])
 def test_a_guest_may_err_in_a_released_motion_by_what_it_declares(declared, verdict):
     """One of adaptive steps errs alike whatever step it is given."""
     question = ask_briefly()
@@ -225,7 +225,7 @@ def test_a_guest_may_err_in_a_released_motion_by_what_it_declares(declared, verd
     assert row(rows, "adaptive", "theta_2").verdict == verdict
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypatch):
     from fourbar_validation.report import scene_pictures
 

@@ -5,7 +5,7 @@ there.
 import html
 from dataclasses import replace
 
-import pytest
+from pytest import fixture, mark
 
 from fourbar_validation.compare.rows import FAILS, FORMULAS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound
@@ -32,7 +32,7 @@ DECLARED = ErrorBound(
 )
 
 
-@pytest.fixture
+@fixture
 def run_against(tmp_path, monkeypatch):
     """Runs scenes with these records against a run with these rows, and returns the
     summary and how the earlier run is named.
@@ -56,7 +56,7 @@ def run_against(tmp_path, monkeypatch):
 WIDER = Engine("mine", FreeBody, DECLARED)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "before, engine, error, words",
     [
         ([ROW], WIDER, 1e-15, "WEAKER RULE: mine: factor 1.11"),
@@ -100,7 +100,7 @@ def test_the_verdict_says_since_when_of_the_failure_that_it_names(
     assert "It held in" in (tmp_path / "now" / "report.md").read_text("utf-8")
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "kind, chosen, status",
     [(Guest, "", 1), (Engine, "mine,other", 1), (Engine, "", 0)],
 )
@@ -118,7 +118,7 @@ def test_an_engine_that_was_asked_for_and_compared_nothing_is_no_success(
     assert summary.headline.startswith(words) == bool(status) != summary.good
 
 
-@pytest.mark.parametrize("broken", ["", "mine"])
+@mark.parametrize("broken", ["", "mine"])
 def test_whoever_breaks_down_alone_is_blamed(broken):
     error = ZeroDivisionError("division by zero")
 

@@ -3,7 +3,7 @@
 Of this run, undamaged, each in its place, or made again.
 """
 
-import pytest
+from pytest import mark, raises
 
 from fourbar.errors import DependencyError, InputError
 from fourbar_validation.run.store import RunningError, Store
@@ -44,23 +44,23 @@ def test_only_a_part_of_this_run_in_its_place_is_taken(tmp_path):
     assert not [*parts.iterdir()]
 
 
-@pytest.mark.parametrize("place", (0.5, 0.99))
+@mark.parametrize("place", (0.5, 0.99))
 def test_a_part_with_a_damaged_byte_is_not_taken(place, tmp_path):
     part = fill(tmp_path, "one", 0) / "000000"
     written = bytearray(part.read_bytes())
     written[int(place * len(written))] ^= 1
     part.write_bytes(written)
     with Store(tmp_path, {"suite": "one"}).held() as store:
-        with pytest.raises(DependencyError, match="is damaged"):
+        with raises(DependencyError, match="is damaged"):
             store.read(0)
         assert store.done() == set() and not part.exists()
 
 
 def test_a_folder_has_one_run_at_a_time_and_keeps_parts_in_a_folder(tmp_path):
-    with Store(tmp_path, {"suite": "one"}).held(), pytest.raises(RunningError):
+    with Store(tmp_path, {"suite": "one"}).held(), raises(RunningError):
         fill(tmp_path, "one", 0)
     (tmp_path / "parts").rmdir()
     (tmp_path / "parts").write_text("a file")
     words = "must be a folder, in which a run keeps its parts"
-    with pytest.raises(InputError, match=words):
+    with raises(InputError, match=words):
         fill(tmp_path, "one", 0)

@@ -3,7 +3,7 @@
 from itertools import product
 
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar import (
@@ -86,7 +86,7 @@ def list_held(scene):
     return rows.keys()
 
 
-@pytest.mark.parametrize("name", SCENES)
+@mark.parametrize("name", SCENES)
 def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
     left_out = {
         "friction": {"superposed", "split masses"},
@@ -98,7 +98,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
     assert rows["scaled"].error == rows["scaled"].allowed == 0.0
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "scene, lines",
     [
         (
@@ -128,8 +128,8 @@ def make_linkage(d, *lengths):
     return fourbar.FourBar(d, *bars, ground_angle=0.4)
 
 
-@pytest.mark.parametrize("command", [2, 3, 4])
-@pytest.mark.parametrize(
+@mark.parametrize("command", [2, 3, 4])
+@mark.parametrize(
     "name, lengths",
     read_rows("""
 parallelogram | 0.3 0.1 0.3 0.1
@@ -169,9 +169,9 @@ IN_LINE = ((0.1, 0.25, 0.22), (0.17, 0.3, 0.22))
 """Lengths of input, coupler and output."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
-@pytest.mark.parametrize("command", (2, 3, 4))
+@mark.slow
+@mark.parametrize("gap", (0, 1, 2, 3, 5, 8, 13, 21, 31, 33, 64, 1000))
+@mark.parametrize("command", (2, 3, 4))
 def test_lengths_that_miss_a_change_point_by_roundings_are_the_same(command, gap):
     """Rounding decides in each statement whether there is a change point.
 
@@ -204,12 +204,12 @@ def test_springs_that_are_wound_through_a_change_point_by_rounding_are_not_judge
         assert sum("wound" in line for line in question.left_out) == many
 
 
-@pytest.mark.parametrize("index", range(6))
+@mark.parametrize("index", range(6))
 def test_random_scenes_have_the_same_numbers(index):
     assert list_held(draw_random_scene(3, index, tuple(DrawnType)))
 
 
-@pytest.mark.parametrize("name", TRANSFORMATIONS)
+@mark.parametrize("name", TRANSFORMATIONS)
 def test_one_number_that_differs_fails_its_row(name, monkeypatch):
     solve = transformed.solve
     calls = []

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-import pytest
+from pytest import mark
 
 import fourbar
 from fourbar import Motion, Sweep, solve, uniform
@@ -83,8 +83,8 @@ def test_the_suite_is_made_from_its_parameters_alone():
     assert sources == {family.statement for family in HARD_FAMILIES}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", POSED)
+@mark.slow
+@mark.parametrize("name", POSED)
 def test_a_hard_scene_holds(name):
     """No row of any check and engine fails, the file as it is shipped included.
 
@@ -105,7 +105,7 @@ def place_before_toggle(*distances):
     return set_angles(dress(lengths), psi + inwards * np.array(distances))
 
 
-@pytest.mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
+@mark.parametrize("engine", EXACT, ids=lambda engine: engine.name)
 def test_beyond_a_toggle_no_engine_finds_a_position(engine):
     """The input is where it is commanded."""
     beyond = place_before_toggle(*(-distance for distance in TOGGLE))
@@ -161,7 +161,7 @@ def test_an_answer_nearby_has_the_sine_of_the_formulas():
     np.testing.assert_allclose(sines, formulas.sin_mu, rtol=1e-15)
 
 
-@pytest.mark.parametrize("kind", families.CHANGE_POINTS)
+@mark.parametrize("kind", families.CHANGE_POINTS)
 def test_beyond_a_change_point_an_answer_nearby_is_one_of_the_same_assembly(kind):
     """Pin forces grow as 1/distance there: the last digit of theta_2 is asked about.
 
@@ -193,7 +193,7 @@ def test_the_balls_know_a_coupler_that_does_not_turn():
         assert np.isfinite(answered[quantity]).all(), quantity
 
 
-@pytest.mark.parametrize("name", AT_CHANGE_POINTS)
+@mark.parametrize("name", AT_CHANGE_POINTS)
 def test_the_file_opens_in_the_assembly_that_is_stated_beyond_a_change_point_too(
     name, monkeypatch
 ):
@@ -234,7 +234,7 @@ def test_near_a_toggle_a_wrong_force_fails_that_the_law_excuses():
     assert verdict == DEGRADED and allowed < wrong
 
 
-@pytest.mark.slow
+@mark.slow
 def test_predictions_know_what_no_law_in_sines_knows():
     """A parallelogram that stays parallel is regular in the formulas and 1/d^3 in the
     data; a scale changes nothing.
@@ -253,7 +253,7 @@ def test_every_declared_limit_is_measured():
     assert [limit.of for limit in MEASURED] == [*BOUNDARIES]
 
 
-@pytest.mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)
+@mark.parametrize("limit", MEASURED, ids=lambda limit: limit.of.name)
 def test_a_limit_is_where_it_was(limit, tmp_path, monkeypatch):
     """A failure after an engine's upgrade means another limit.
 
@@ -312,7 +312,7 @@ WRONG_RUNS = {
 }
 
 
-@pytest.mark.parametrize("what", WRONG_RUNS)
+@mark.parametrize("what", WRONG_RUNS)
 def test_what_is_wrong_in_a_simulation_is_seen(what):
     changes, seen = WRONG_RUNS[what]
     answer = simulated(replace(RECIPE, **changes))
@@ -320,7 +320,7 @@ def test_what_is_wrong_in_a_simulation_is_seen(what):
     assert alarm(answer, "acceleration_gap") <= ("solver" not in changes)
 
 
-@pytest.mark.parametrize("what", ["qvel", "qacc"])
+@mark.parametrize("what", ["qvel", "qacc"])
 def test_a_reset_and_what_caused_it_are_seen(what, monkeypatch, tmp_path):
     """A state or an acceleration that MuJoCo takes for bad occurs once, in the middle
     of the run.
@@ -349,7 +349,7 @@ def test_an_alarm_fails_its_row(monkeypatch):
     assert (FAILS, "the sky falls") in {(row.verdict, row.reason) for row in rows}
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_free_motion_through_change_points_in_every_engine():
     """IFToMM A02, one window, ten seconds: lim.ii.udc.es/mbsbenchmark."""
     (name, scene), *_ = families.released(durations=(10.0,), steps=10)
@@ -367,7 +367,7 @@ mujoco-forward | energy | 1e-5
         assert rows[engine, quantity].error < float(most)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, why",
     read_rows("""
 speeds-+1e+6 | mjMAXVAL
@@ -383,7 +383,7 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name
     assert row.verdict == (UNDECIDED if why else AGREES) and why in row.reason
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "alpha, stop, verdict",
     [(0.0, 0.101, UNDECIDED), (0.0, 6.0, AGREES), (5e6, 0.101, AGREES)],
 )
@@ -402,7 +402,7 @@ def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reache
     assert row.verdict == AGREES, row
 
 
-@pytest.mark.parametrize("bar", [3, 4])
+@mark.parametrize("bar", [3, 4])
 def test_a_driven_bar_stands_still_where_its_couple_has_a_pole(bar):
     (family,) = [one for one in HARD_FAMILIES if one.name == f"pole-T{bar}"]
     for label, scene in family.scenes():

@@ -6,9 +6,8 @@ A path runs along its curve: no false corner, through both branches.
 import re
 
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
-from pytest import approx
+from pytest import approx, mark
 
 import fourbar
 from fourbar import Friction, Gravity, Motion, Point, Sweep, solve
@@ -53,8 +52,8 @@ ratios | ω₄/ω₂ | omega_4/omega_2
 """Figures, their curves, and the columns that these draw."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("figure, name, column", CURVES)
+@mark.slow
+@mark.parametrize("figure, name, column", CURVES)
 def test_curves_are_columns_in_the_unit_of_their_axis(figure, name, column):
     shown = np.interp(DEGREES, *list_lines(figure, units="mN")[name].T)
     (expected,) = choose_columns(solve(SCENE), column)
@@ -62,7 +61,7 @@ def test_curves_are_columns_in_the_unit_of_their_axis(figure, name, column):
     assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(values).max())
 
 
-@pytest.mark.slow
+@mark.slow
 def test_what_a_clipped_axis_leaves_out_is_a_pure_number():
     """A ratio has no prefix: a thousand is no "k1"."""
     scene = crank_rocker(motion=Motion(Sweep(0.0, 2.0 * np.pi, 3601), 10.0))
@@ -73,13 +72,13 @@ def test_what_a_clipped_axis_leaves_out_is_a_pure_number():
     )
 
 
-@pytest.mark.slow
+@mark.slow
 def test_no_line_crosses_a_dead_centre():
     jumps = np.isnan(list_lines("ratios")["T₄/T₂"][:, 1]).sum()
     assert jumps == np.sum(np.diff(np.sign(solve(SCENE).omega_4)) != 0.0)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_instant_centres_lie_on_the_lines_of_the_bars():
     path = list_lines("centres")["$I_{24}$"]
     theta_1 = SCENE.linkage.ground_angle
@@ -103,7 +102,7 @@ def measure_chords(path):
     return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_whole_circuit_is_traced_without_a_corner_and_drawn():
     """By degrees of the input this path has chords of 40 mm; its extent is 120 mm."""
     view = make_view(loads(COORDINATES))
@@ -163,7 +162,7 @@ def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
     assert re.search(r"evaluated, torque_(low|high)\s=\s", view.notes[-1])
 
 
-@pytest.mark.parametrize("acceleration, lines", [(0.0, 3), (3.0, 1)])
+@mark.parametrize("acceleration, lines", [(0.0, 3), (3.0, 1)])
 def test_a_start_is_no_range_that_friction_holds(acceleration, lines):
     rest = Motion(Sweep(0.5, 1.5, 20), 0.0, acceleration)
     view = make_view(crank_rocker(motion=rest, effects=(Friction.at(O2=2.0),)))

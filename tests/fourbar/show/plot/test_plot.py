@@ -12,11 +12,10 @@ from math import atan2, degrees, hypot, pi, radians, tau
 
 import matplotlib
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.testing import assert_allclose
-from pytest import approx, raises
+from pytest import approx, mark, raises
 
 import fourbar
 from fourbar import (
@@ -141,8 +140,8 @@ def clashes(figure):
     ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("file_format", plot.FORMATS)
+@mark.slow
+@mark.parametrize("file_format", plot.FORMATS)
 def test_the_same_scene_gives_the_same_bytes_in_every_thread(tmp_path, file_format):
     before = dict(matplotlib.rcParams)
     files = [tmp_path / f"{k}.{file_format}" for k in (1, 2, 3)]
@@ -155,7 +154,7 @@ def test_the_same_scene_gives_the_same_bytes_in_every_thread(tmp_path, file_form
     assert dict(matplotlib.rcParams) == before
 
 
-@pytest.mark.slow
+@mark.slow
 def test_a_file_has_a_dark_form_and_a_hostile_title_is_text(tmp_path):
     """A figure within a page leaves its colours to the page."""
     title = "$\\frac{ <script>alert(1)</script> & \x1b[31m\u2028 %s {0} " + 300 * "x"
@@ -168,8 +167,8 @@ def test_a_file_has_a_dark_form_and_a_hostile_title_is_text(tmp_path):
     assert len(style.shorten_text(title, 50)) == 50
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
+@mark.slow
+@mark.parametrize("name", sorted(set(FIGURES) - {"energy", "stroke"}))
 def test_every_figure_shows_what_it_takes_and_no_texts_overlap(name):
     """A position shows, dimensions where they are taken; panels share scales.
 
@@ -204,8 +203,8 @@ CLEAR_FIGURES = [
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene, name", CLEAR_FIGURES)
+@mark.slow
+@mark.parametrize("scene, name", CLEAR_FIGURES)
 def test_no_texts_overlap_whatever_moves(scene, name):
     figure = composed(scene, name)
     assert not clashes(figure)
@@ -214,7 +213,7 @@ def test_no_texts_overlap_whatever_moves(scene, name):
         assert all(axes.get_xlabel().endswith(("(s)", "m)")) for axes in flat)
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "name, dimensions",
     slow_but(
         {("landing_gear", True)},
@@ -257,8 +256,8 @@ LOCATED = 1e-5
 """Relative: a flat peak is located to the root of round-off."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scene, label", MOVING.values(), ids=MOVING)
+@mark.slow
+@mark.parametrize("scene, label", MOVING.values(), ids=MOVING)
 def test_drawn_curves_are_those_of_the_solution(scene, label):
     """A curve over an angle or a stroke goes from the least one to the greatest."""
     solution = solved(scene)
@@ -284,7 +283,7 @@ def test_drawn_curves_are_those_of_the_solution(scene, label):
         assert panel.get_xlim() == approx((over.min(), over.max()))
 
 
-@pytest.mark.slow
+@mark.slow
 def test_bars_are_drawn_to_scale_at_the_requested_position():
     axes = composed(crank_rocker(), "linkage", position=1.3).axes[0]
     bars = [
@@ -298,7 +297,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
     assert axes.get_aspect() == 1.0
 
 
-@pytest.mark.slow
+@mark.slow
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     """The torque of bar 4 diverges where bars 2 and 3 are in line."""
     shown = make_view(THREE_ROCKERS)
@@ -334,7 +333,7 @@ def test_an_ordinary_curve_is_not_clipped():
     assert curves.choose_limit([np.full(3, np.nan)]) is None
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "drive",
     [
         {"drive_bar": 2},
@@ -360,7 +359,7 @@ def test_free_bodies_balance(drive):
         assert named and all(" at $" in text for text in named)
 
 
-@pytest.mark.parametrize("name", ["freebody", "bars", "forces"])
+@mark.parametrize("name", ["freebody", "bars", "forces"])
 def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
     caption = draw_figure(RESTING, name).figure.subfigs[0].get_supxlabel()
     words = " ".join(caption.split())
@@ -370,9 +369,7 @@ def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
     assert (ends in words) == (name != "forces"), words
 
 
-@pytest.mark.parametrize(
-    "angle, position", [(radians(60.0), None), (None, radians(60.0))]
-)
+@mark.parametrize("angle, position", [(radians(60.0), None), (None, radians(60.0))])
 def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
     """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
     linkage = fourbar.uniform(*PARALLELOGRAM)
@@ -409,7 +406,7 @@ def test_what_stands_at_an_axis_is_whole():
     assert "Linkage at θ₂ = 0°" in figure.axes[0].get_title("left")
 
 
-@pytest.mark.parametrize("from_pin", [(0.2, -0.3), (0.15, -0.35)])
+@mark.parametrize("from_pin", [(0.2, -0.3), (0.15, -0.35)])
 def test_a_label_keeps_off_the_arrow_of_gravity_and_the_outline_of_a_path(from_pin):
     scene = crank_rocker(points=(Point("tip", 4, from_pin),))
     (axes,) = composed(scene, "linkage").axes
@@ -432,7 +429,7 @@ def test_the_force_of_a_linear_drive_has_poles_where_its_stroke_stands_still():
     assert np.array_equal(gaps, stands + 1 + np.arange(len(stands)))
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "figure, quantity, rings", [("torque", "Torque", 0), ("overview", "Power", 1)]
 )
 def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
@@ -450,8 +447,8 @@ def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
     assert [line.get_marker() for line in panel.lines].count("o") == rings
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("turned", (False, True), ids=("up", "down"))
+@mark.slow
+@mark.parametrize("turned", (False, True), ids=("up", "down"))
 def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     scene = crank_rocker()
     if turned:  # speed changes sign, and so does the angle at which friction acts
@@ -480,7 +477,7 @@ def test_what_dry_friction_holds_is_drawn_about_the_torque():
     assert_allclose([low, high], [torque - half, torque + half])
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_position_drawn_is_clear_of_poles_of_its_own_branch():
     """The one of the open branch is a pole of the crossed one."""
 
@@ -518,9 +515,7 @@ no torque | {"figure": "freebody"} | no value at theta_2 = 17\.1887 deg: no_torq
 """)
 
 
-@pytest.mark.parametrize(
-    "name, options, words", slow_but(REFUSED[:8] + REFUSED[-1:], REFUSED)
-)
+@mark.parametrize("name, options, words", slow_but(REFUSED[:8] + REFUSED[-1:], REFUSED))
 def test_what_cannot_be_drawn_is_named_and_leaves_no_file(
     tmp_path, name, options, words
 ):
@@ -536,7 +531,7 @@ instants 2 ms apart.
 """
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_work_of_what_acts_is_the_kinetic_energy():
     damped = Viscous.at(O2=0.002, B=0.001)
     scene = released(effects=(Gravity(), damped, Flywheel(0.01, 4)))
@@ -557,7 +552,7 @@ def test_the_work_of_what_acts_is_the_kinetic_energy():
     assert len(looks) == len({*looks}) == 6
 
 
-@pytest.mark.parametrize(
+@mark.parametrize(
     "scene", (thesis(), *map(commanding, COMMANDS.values())), ids=("thesis", *COMMANDS)
 )
 def test_a_film_of_what_swings_goes_there_and_back(scene):
@@ -612,7 +607,7 @@ def test_a_cylinder_keeps_its_barrel_and_its_rod_comes_out():
     assert lengths[0] < 1000.0 * shown.sweep.stroke.min()
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_stroke_is_a_figure_where_it_is_not_the_axis():
     scene = commanding(COMMANDS[r"$\theta_4$ (°)"])
     (axes,) = composed(scene, "stroke").axes

@@ -8,9 +8,9 @@ from dataclasses import replace
 from math import copysign, cos, pi, sin, tau
 
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
+from pytest import fixture, mark
 
 import fourbar
 from fourbar import Motion, Point, Table, solve
@@ -28,7 +28,7 @@ TURNING = Load(3, (2.0, 0.5), from_centre=(0.03, 1.0), frame="bar")
 TABLED = Load(4, (5.0, 0.2), table=Table((0.0, pi, tau), (1.0, -1.0, 1.0)))
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def everything():
     """Every effect that a scene file can name, by its own example.
 
@@ -50,7 +50,7 @@ def test_everything_that_acts_has_a_symbol(everything):
         assert "drive" not in [symbol.kind for symbol in list_acting(scene)]
 
 
-@pytest.mark.parametrize("index", [5, 30])
+@mark.parametrize("index", [5, 30])
 def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     """A load's arrow begins at its point and points along it.
 
@@ -87,7 +87,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     assert abs(stop - O4 - cmath.rect(0.08, theta_4)) < 1e-15
 
 
-@pytest.mark.parametrize("moment", [2.0, -2.0])
+@mark.parametrize("moment", [2.0, -2.0])
 def test_the_arrow_of_a_moment_turns_as_the_moment_does(moment):
     scene = crank_rocker(loads=(Load(4, moment=moment),))
     (symbol,) = (one for one in list_acting(scene) if one.kind == "moment")
@@ -101,7 +101,7 @@ def test_the_arrow_of_a_moment_turns_as_the_moment_does(moment):
     assert copysign(1.0, area) == copysign(1.0, moment)
 
 
-@pytest.fixture(scope="module")
+@fixture(scope="module")
 def crowded(everything):
     """All that acts drawn on a crank of a twelfth of the coupler: axes, view, scale."""
     linkage = everything.linkage
@@ -145,7 +145,7 @@ def test_what_lies_off_a_bar_is_joined_to_it(crowded):
         assert any(np.allclose(plate, corners) for plate in plates)
 
 
-@pytest.mark.slow
+@mark.slow
 def test_the_points_of_a_scene_are_drawn_where_they_are():
     """Path, speed and mark in the plot, place and columns in the page."""
     scene = crank_rocker(points=(Point("P", 3, (0.15, 0.7)),))
