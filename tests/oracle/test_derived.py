@@ -17,8 +17,8 @@ from fourbar.studies.keys import read_numbers
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from tests.oracle.oracles import judge_by
 from tests.oracle.variants import SceneFile
+from tests.support.rows import slow_but
 from tests.support.scenes import CYLINDER, crank_rocker
-from tests.support.shares import slow_but
 
 
 def massive(lengths, masses, *effects, theta_1=0.0, **changes):

@@ -13,7 +13,7 @@ from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from fourbar_validation.scenes.suites import read_default_suite
 from tests.oracle.oracles import ORACLES, judge_by
 from tests.oracle.scenes import draw_motion, take_scene
-from tests.support.shares import slow_but
+from tests.support.rows import slow_but
 
 SHIPPED = read_default_suite()
 RANDOM_SCENES = 200

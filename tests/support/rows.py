@@ -1,10 +1,17 @@
-"""Tables of cases as text: a line is a case, and " | " stands between its columns."""
+"""Tables of cases: their rows, what is refused in one, and which are quick."""
+
+from contextlib import contextmanager
+
+from pytest import mark, param, raises
+
+from fourbar import InputError
 
 
 def read_rows(table):
     """Return the cells of each line, without the spaces around them.
 
-    Empty lines, and those that begin with #, are none.
+    A line is a case, and " | " stands between its columns. Empty lines, and those that
+    begin with #, are none.
     """
     rows = []
     for line in table.splitlines():
@@ -12,3 +19,28 @@ def read_rows(table):
             cells = f"{line} ".replace(" | | ", " |  | ").split(" | ")
             rows.append(tuple(cell.strip() for cell in cells))
     return rows
+
+
+@contextmanager
+def refused(*words):
+    """What is done here is refused, in one line with these words."""
+    with raises(InputError) as caught:
+        yield
+    said = str(caught.value)
+    assert "\n" not in said
+    for word in words:
+        assert word in said, said
+
+
+def slow_but(quick, cases):
+    """Return the cases of a test, of which all but the quick ones are slow.
+
+    A case of several arguments is a tuple.
+    """
+    return [
+        param(
+            *(case if isinstance(case, tuple) else (case,)),
+            marks=[] if case in quick else mark.slow,
+        )
+        for case in cases
+    ]

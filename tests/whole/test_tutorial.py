@@ -13,7 +13,7 @@ from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar_validation.cli import status as harness
 from tests.support.checkout import ROOT, read
-from tests.support.shares import slow_but
+from tests.support.rows import slow_but
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SESSION = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)

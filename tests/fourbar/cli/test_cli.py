@@ -36,9 +36,8 @@ from fourbar.mjcf import assembly
 from fourbar.mjcf.document import write_mjcf_for
 from fourbar.show import tables
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import RESTING, balance, crank_rocker, find_angle
-from tests.support.shares import slow_but
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
 

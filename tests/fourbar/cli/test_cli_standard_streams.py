@@ -10,8 +10,7 @@ from pytest import fixture, mark
 
 from fourbar.cli import status
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, slow_but
 
 SCENE = MODELS / "crank_rocker.toml"
 

@@ -16,8 +16,8 @@ importorskip(
 from fourbar.edit.exports import evaluate_scene
 from fourbar_validation.places import MODELS
 from tests.support.block import read_block
+from tests.support.rows import slow_but
 from tests.support.scenes import RESTING
-from tests.support.shares import slow_but
 
 BOUNDED = (
     "crank_rocker",

@@ -30,9 +30,7 @@ from fourbar.edit.exports import evaluate_scene, pack_frame
 from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.edit.session import MOST_KEPT, MOST_SOLVED_ANEW, Session
 from fourbar_validation.places import MODELS
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, refused, slow_but
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
 

@@ -24,8 +24,7 @@ from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import PINS
 from fourbar.quantities import CHANGE_POINT, WOUND
 from fourbar_validation.run.judge import judge
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, slow_but
 
 EDGE = 1e-9
 """rad; nearer than this to half a turn rounding may put a position on either side."""

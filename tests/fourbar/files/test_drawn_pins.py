@@ -19,8 +19,7 @@ from fourbar import (
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, slow_but
 
 EPS = 2.0**-52
 K = 8.0

@@ -13,8 +13,7 @@ from fourbar.files import dump, loads
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.show.plot.symbols import list_acting
 from fourbar.studies.keys import list_entries, read_number
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 
 FILE = '''
 from dataclasses import dataclass

@@ -29,8 +29,7 @@ from fourbar import (
 from fourbar.files import dump, load, loads, new_scene, save
 from fourbar_validation.places import MODELS
 from tests.fourbar.test_solving import EXAMPLES, scenes
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 

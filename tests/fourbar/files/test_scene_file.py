@@ -11,8 +11,7 @@ from fourbar import dump, solve
 from fourbar.errors import BAD_INPUT, FourBarError, InputError
 from fourbar.files import loads
 from fourbar.files.scene_file import LARGEST_SCENE_FILE
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, slow_but
 
 GOOD = """title = "good"
 [lengths]

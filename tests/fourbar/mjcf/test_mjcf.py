@@ -38,9 +38,8 @@ from fourbar_validation.scenes.random import (
     draw_uniform,
 )
 from fourbar_validation.scenes.suites import list_model_files
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import crank_rocker
-from tests.support.shares import slow_but
 
 GAP = 1e-4
 """The promise of the file: the loop closed within this part of the longest bar."""

@@ -13,8 +13,7 @@ from fourbar.files import dump, loads
 from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
 from tests.support.block import read_block
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 
 EXACT = 1e-13
 """Relative to the largest term: some ten roundings of a polynomial of degree 5."""

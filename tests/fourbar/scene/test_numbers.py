@@ -13,8 +13,7 @@ from pytest import mark, raises
 from fourbar import InputError, Point, solve, vary
 from fourbar.files import dump, loads
 from fourbar.solution import write_json
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker
 
 POINTS = (

@@ -32,9 +32,7 @@ from fourbar.formulas.mobility import find_limit_angles, limit_positions
 from fourbar.linkage import MOVING_BARS
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import command_at
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, refused, slow_but
 
 U = 2.0**-53
 BARS = [Bar(0.1, 0.2), Bar(0.25, 0.5, 0.01, (0.12, 0.2)), Bar(0.22, 0.4)]

@@ -23,8 +23,7 @@ from fourbar import (
 )
 from fourbar.mjcf import write_mjcf
 from fourbar_lab.stability import compute_reference
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker, recommand
 
 BARS = 10.0

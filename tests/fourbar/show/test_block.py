@@ -47,6 +47,7 @@ from fourbar.show.summary import Facts
 from fourbar.show.tables import write_cells
 from fourbar.solving import find_last_stage
 from tests.support.block import read_block
+from tests.support.rows import slow_but
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     CYLINDER,
@@ -57,7 +58,6 @@ from tests.support.scenes import (
     find_angle,
     thesis,
 )
-from tests.support.shares import slow_but
 
 MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
 

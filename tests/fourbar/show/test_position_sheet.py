@@ -30,8 +30,8 @@ from fourbar.show.located import locate
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
 from fourbar.studies import course
+from tests.support.rows import slow_but
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, crank_rocker
-from tests.support.shares import slow_but
 from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6

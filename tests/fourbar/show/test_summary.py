@@ -33,8 +33,8 @@ from fourbar.show.motion_curves import acts
 from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
 from fourbar_validation.places import MODELS
+from tests.support.rows import slow_but
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare, crank_rocker
-from tests.support.shares import slow_but
 
 NODES, WEIGHTS = leggauss(600)
 """Positions of each smooth piece of a motion, closer to each other at its ends."""

@@ -31,6 +31,7 @@ from fourbar.show.duty import list_duty
 from fourbar_validation.places import MODELS
 from tests.fourbar.show.test_summary import list_sizes
 from tests.support.block import read_block
+from tests.support.rows import slow_but
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     CYLINDER,
@@ -38,7 +39,6 @@ from tests.support.scenes import (
     crank_rocker,
     find_angle,
 )
-from tests.support.shares import slow_but
 
 LOCATED = 1e-6
 """rad; near a limit an angle changes as the root of the distance, whose last digits are

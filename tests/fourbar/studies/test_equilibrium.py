@@ -38,13 +38,13 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar_validation.places import MODELS
+from tests.support.rows import slow_but
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     balanced_lamp,
     bare,
     recommand,
 )
-from tests.support.shares import slow_but
 
 TURN = 2.0 * pi
 M, R, INERTIA = 1.5, 0.04, 0.002

@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose
 from fourbar import Gravity, Tolerance, Viscous, save, solve, tolerances, uniform, vary
 from fourbar.files import dump, loads
 from fourbar.studies.keys import list_entries
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker
 from tests.support.texts import LENGTHS
 

@@ -30,8 +30,7 @@ from fourbar import (
 )
 from fourbar.files import loads
 from fourbar.studies.keys import list_entries, read_place, replace_place
-from tests.support.refusals import refused
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
 ACTED_ON = loads("""

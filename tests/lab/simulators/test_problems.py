@@ -35,7 +35,7 @@ from fourbar_validation.engines.exact import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from tests.lab.simulators.test_simulators import ask_position
 from tests.support.checkout import ROOT, read
-from tests.support.shares import slow_but
+from tests.support.rows import slow_but
 
 PAGE = read("docs/benchmark.md")
 NAMES = list_problems()

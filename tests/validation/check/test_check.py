@@ -27,9 +27,8 @@ from fourbar_validation.check.mistakes import list_column_mistakes, list_hypothe
 from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import bare, recommand, relink
-from tests.support.shares import slow_but
 
 SCENES = {
     name: fourbar.load(MODELS / f"{name}.toml")

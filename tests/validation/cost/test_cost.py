@@ -36,8 +36,8 @@ from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.checkout import read
 from tests.support.costs import point
+from tests.support.rows import slow_but
 from tests.support.scenes import CYLINDER, crank_rocker, recommand
-from tests.support.shares import slow_but
 
 
 def turning(omega=10.0, positions=36):

@@ -28,9 +28,8 @@ from fourbar_validation.engines import free_body_effects
 from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.run.judge import judge
 from tests.support.here import EXACT, THROUGH_TIME
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import crank_rocker
-from tests.support.shares import slow_but
 
 SPRINGS = read_rows("""
 1 0.1 -1.5 | 4 0.08 0.2 | 200 0.05 3 |

@@ -36,8 +36,8 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_by
+from tests.support.rows import slow_but
 from tests.support.scenes import crank_rocker, find_angle, recommand, relink, thesis
-from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING, scene
 
 ENGINE = {

@@ -32,9 +32,8 @@ from tests.support.guests import (
     write_program,
 )
 from tests.support.here import Heard, judge_here
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import CYLINDER, crank_rocker
-from tests.support.shares import slow_but
 from tests.whole.test_imports import ROOT
 
 HERE = "tests.support.hostile_class:"

@@ -48,7 +48,7 @@ from fourbar_validation.regression.scenes import describe_changes
 from fourbar_validation.report.junit import list_cases
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.here import judge_here
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.runs import (
     FORMS,
     HERE,
@@ -60,7 +60,6 @@ from tests.support.runs import (
     save_run,
 )
 from tests.support.scenes import relink
-from tests.support.shares import slow_but
 
 TIMES = "scene,engine,-,1,1,3.0\n"
 MODEL = MODELS / "crank_rocker.toml"

@@ -42,7 +42,7 @@ from fourbar.show.plot import curves, film, freebody, linkage_figure, style
 from fourbar.show.plot.figures import FIGURES, WITH_DIMENSIONS, draw_figure
 from fourbar.show.plot.view import CLEAR, make_view, set_branch
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import (
     CYLINDER,
     PARALLELOGRAM,
@@ -51,7 +51,6 @@ from tests.support.scenes import (
     recommand,
     thesis,
 )
-from tests.support.shares import slow_but
 from tests.support.texts import EVERYTHING
 
 SIGNATURES = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF"}

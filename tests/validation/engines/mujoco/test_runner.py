@@ -17,8 +17,8 @@ from fourbar_validation.engines.mujoco import runner, simulate
 from fourbar_validation.engines.mujoco.runner import OVERRUN, clip_angles
 from fourbar_validation.run.judge import judge
 from tests.support.here import THROUGH_TIME
+from tests.support.rows import slow_but
 from tests.support.scenes import crank_rocker
-from tests.support.shares import slow_but
 from tests.validation.engines.test_applied_effects import ACTING
 
 KINK = 1e-5

@@ -31,8 +31,8 @@ from fourbar_validation.run.judge_engines import compare_answer
 from fourbar_validation.run.question import Question
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.here import THROUGH_TIME, judge_by
+from tests.support.rows import slow_but
 from tests.support.scenes import crank_rocker, recommand, thesis
-from tests.support.shares import slow_but
 from tests.validation.engines.test_engines import commanded, driven
 
 TURN = Sweep(0.1, 0.1 + 2 * math.pi, 90)

@@ -18,7 +18,7 @@ from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_sce
 from fourbar_validation.places import MODELS
 from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
 from tests.support.robots import AS_DRAWN, Planar, file_of, measure, read_scene
-from tests.support.shares import slow_but
+from tests.support.rows import slow_but
 
 SCENE = """
 [lengths]

@@ -23,8 +23,7 @@ from tests.support.robots import (
     read_scene,
     rotation,
 )
-from tests.support.rows import read_rows
-from tests.support.shares import slow_but
+from tests.support.rows import read_rows, slow_but
 
 ANCHOR = 'anchor="-0.06 0 0"'
 QUATERNION = "0.982434 0 0.18661 0"

@@ -16,7 +16,7 @@ from fourbar.linkage import require
 from fourbar_validation.engines.mujoco.robots.loop_facts import PoseOptions
 from fourbar_validation.engines.mujoco.robots.pose import pose_robot
 from tests.support.robots import FOOT, file_of
-from tests.support.shares import slow_but
+from tests.support.rows import slow_but
 
 
 def pose(text, key=None, **joints):

@@ -29,8 +29,8 @@ from fourbar_validation.robots.loop_errors import (
     read_measure_options,
 )
 from tests.support.robots import measure, pose_loop
+from tests.support.rows import slow_but
 from tests.support.scenes import find_angle, meet_circles
-from tests.support.shares import slow_but
 
 FOOT = MODELS / "robots" / "biped_foot.xml"
 LIGHT_LOAD = 0.3
