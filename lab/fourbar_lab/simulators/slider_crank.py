@@ -91,7 +91,7 @@ def make_problem(name: str) -> dict[str, Any]:
     command = stated["command"]
     rates = command["omega_2"], command["alpha_2"], command["branch"]
     rows = [
-        solve_eight_equations(stated["scene"], theta, *rates)
+        solve_free_bodies(stated["scene"], theta, *rates)
         for theta in command["theta_2"]
     ]
     answers = {
@@ -112,14 +112,18 @@ def make_problem(name: str) -> dict[str, Any]:
     }
 
 
-def solve_eight_equations(
+def solve_free_bodies(
     scene: dict[str, Any],
     theta_2: float,
     omega_2: float,
     alpha_2: float,
     branch: int,
 ) -> dict[str, Any]:
-    """Solve the eight equations of the three free bodies at one position."""
+    """Solve the free bodies of slider, rod and crank in turn at one position.
+
+    The slider gives the force at B along the guide, the moment of the rod about A that
+    across it, and the sums of forces and moments the others.
+    """
     from mpmath import mp, mpc, mpf
 
     with mp.workdps(REFERENCE_DIGITS):
@@ -162,54 +166,24 @@ def solve_eight_equations(
             arms.append(arm)
         for load in scene.get("loads", ()):  # at the mass centre
             forces[load["bar"] - 2] -= _resolve_force(*load["force"])
-        x = _solve_free_bodies(forces, moments, arms, crank, rod)
-        angle = float(mp.atan2(sine, cosine))
-        stroke = float((crank + rod).real)
-    values = angle, stroke, x[7], x[0:2], x[2:4], x[4:6], x[6]
+        of_crank, of_rod, of_slider = forces
+        along = -of_slider.real
+        about_A = moments[1] + _cross(arms[1], of_rod)
+        F43 = mpc(along, (about_A + rod.imag * along) / rod.real)
+        F32 = F43 - of_rod
+        F12 = of_crank - F32
+        torque = moments[0] + _cross(arms[0], of_crank) - _cross(crank, F32)
+        angle = mp.atan2(sine, cosine)
+        stroke = (crank + rod).real
+        pins = [[float(F.real), float(F.imag)] for F in (F12, F32, F43)]
+        guide = of_slider.imag + F43.imag
+    values = float(angle), float(stroke), float(torque), *pins, float(guide)
     return dict(zip(SLIDER_CRANK_UNITS, values, strict=True))
 
 
-def _solve_free_bodies(
-    forces: list[Any],
-    moments: list[Any],
-    arms: list[Any],
-    crank: Any,
-    rod: Any,
-) -> list[float]:
-    """Solve for F12, F32, F43 (x, y of each), the guide's force and the torque.
-
-    Parameters
-    ----------
-    forces : what the motion of crank, rod and slider asks for beyond loads, N.
-    moments : of crank and rod about their mass centres, N m.
-    arms : from the first pin of each to its mass centre, m.
-    """
-    from mpmath import mp
-
-    A = mp.zeros(8, 8)
-    y = mp.zeros(8, 1)  # F12 x y, F32 x y, F43 x y, guide, torque
-    on_bars = ({0: 1, 2: 1}, {2: -1, 4: 1}, {4: -1})
-    for bar, factors in enumerate(on_bars):
-        y[2 * bar] = forces[bar].real
-        y[2 * bar + 1] = forces[bar].imag
-        for force_x, factor in factors.items():
-            A[2 * bar, force_x] = factor
-            A[2 * bar + 1, force_x + 1] = factor
-    A[5, 6] = 1
-    # moments about each mass centre: the forces at A on the crank and at O2, those
-    # at A and B on the rod
-    for row, force_x, arm, factor in (
-        (6, 0, -arms[0], 1),
-        (6, 2, crank - arms[0], 1),
-        (7, 2, -arms[1], -1),
-        (7, 4, rod - arms[1], 1),
-    ):
-        A[row, force_x] = -factor * arm.imag
-        A[row, force_x + 1] = factor * arm.real
-    A[6, 7] = 1
-    y[6] = moments[0]
-    y[7] = moments[1]
-    return [float(value) for value in mp.lu_solve(A, y)]
+def _cross(arm: Any, force: Any) -> Any:
+    """Return the moment of a force at the end of an arm."""
+    return arm.real * force.imag - arm.imag * force.real
 
 
 def _resolve_force(size: float, direction: float) -> Any:
