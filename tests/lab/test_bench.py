@@ -10,13 +10,11 @@ from click.testing import CliRunner
 from pytest import mark
 
 from fourbar.errors import FAILED, HOLDS
-from fourbar.quantities import PIN_FORCES, UNKNOWNS
+from fourbar.quantities import UNKNOWNS
 from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import command_positions, make_example
 from fourbar_lab.starts import measure_starts
-from fourbar_lab.thirteen import make_bodies, solve_thirteen
-from tests.support.scenes import crank_rocker, thesis
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -44,19 +42,6 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
     )
     picture = (tmp_path / "bench.svg").read_text()
     assert picture.count('<g id="axes_') == 2 and picture.count('<g id="line2d_') > 15
-
-
-@mark.parametrize(
-    "scene", [crank_rocker(), thesis(np.radians([100.0, 135.0, 220.0, 300.0]))]
-)
-def test_thirteen_equations_have_the_solution_of_the_formulas(scene):
-    solution = solve(scene, "force")
-    unknowns = solve_thirteen(make_bodies(scene, solution.at), scene.drive_bar)
-    pins = (unknowns[:, 2 * column : 2 * column + 2] for column in (0, 1, 3, 4))
-    for name, values in zip(PIN_FORCES, pins, strict=True):
-        expected = solution[name]
-        assert np.abs(values - expected).max() / np.abs(expected).max() < 1e-12
-    np.testing.assert_allclose(unknowns[:, -1], solution.torque, rtol=1e-12, atol=1e-12)
 
 
 @mark.slow

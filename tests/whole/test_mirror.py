@@ -77,7 +77,7 @@ validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary
 validation/report/test_report.py | scene_record svg templating words
 # studies: each through its command
-lab/test_bench.py | contenders starts thirteen
+lab/test_bench.py | contenders starts
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | each fault_scenes injection
