@@ -120,23 +120,16 @@ def _measure_period(
     alpha: Array,
 ) -> float | None:
     """Return the period between upward passages through mid-swing, s, or None."""
-    from scipy.interpolate import BPoly
+    from scipy.interpolate import BPoly, PPoly
 
+    states = np.column_stack([theta, omega, alpha])
+    curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(time, states))
     level = 0.5 * (theta.max() + theta.min())
-    passed = np.flatnonzero((theta[:-1] < level) & (theta[1:] >= level))
-    if len(passed) < 2:
+    passages = curve.solve(level, extrapolate=False)
+    upward = passages[curve(passages, 1) > 0.0]
+    if len(upward) < 2:
         return None
-    passages = []
-    for i in (passed[0], passed[-1]):
-        ends = np.column_stack([theta, omega, alpha])[i : i + 2]
-        ends[:, 0] -= level
-        roots = BPoly.from_derivatives(time[i : i + 2], ends)
-        low = time[i]
-        high = time[i + 1]
-        while (middle := 0.5 * (low + high)) not in (low, high):
-            low, high = (middle, high) if roots(middle) < 0.0 else (low, middle)
-        passages.append(high)
-    return float(passages[1] - passages[0]) / (len(passed) - 1)
+    return float(np.ptp(upward)) / (len(upward) - 1)
 
 
 @click.command()
