@@ -13,8 +13,7 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
-from fourbar.quantities import PIN_FORCES
-from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.advise.advise import advise
@@ -26,13 +25,12 @@ from fourbar_validation.advise.worst_errors import (
     INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
-    find_greatest,
 )
-from fourbar_validation.compare.scales import scale_of
-from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.cost.series import SLOW, SettingCurve, Spot, design_curves
+from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.mujoco.trial import Trial
 from fourbar_validation.engines.plain_loop import PlainLoop
+from fourbar_validation.engines.registry import BALLS
 from fourbar_validation.report.machine import list_versions
 from fourbar_validation.run.store import Store
 
@@ -46,17 +44,12 @@ TIMED_READINGS = 50
 """Readings per timing."""
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
-STUDY_VERSION = 13
+STUDY_VERSION = 14
 """Version of what is tried; parts made with another version are made again."""
-REFERENCE_BITS = 400
-"""Bits of the reference, some hundred and twenty digits."""
 POSITIONS_WITH_REFERENCE = 25
 """Positions at which errors against the reference are taken. They take a few
 milliseconds each.
 """
-_PARTS: dict[str, tuple[str, ...]] = {"torque": ("torque",)}
-_PARTS |= {name: (f"{name}_x", f"{name}_y") for name in PIN_FORCES}
-"""Outputs of the reference that a quantity consists of."""
 EXACT_MOTION = "exact"
 STEPPED_MOTION = "stepped"
 FORMULAS_CURVE = "formulas"
@@ -301,10 +294,10 @@ class CostStudy:
     def _time_formulas(self) -> Iterator[CostPoint]:
         scene, command = self.scene, self.command
         few = choose_few(command)
-        answer = solve(scene, "force", at=few)
-        numbers = {name: answer[name] for name in ERROR_NAMES}
-        balls = evaluate_balls(scene, few)
-        errors = compare_with_balls(scene, few, numbers, balls)
+        reference = ask_at(BALLS.start(), scene, few)
+        if reference.refusal:
+            raise LimitError(reference.refusal)
+        errors = compute_errors(scene, few, reference.quantities)
         action = partial(solve, scene, "force", at=command)
         n = len(command.theta_2)
         label = "formulas, double"
@@ -350,42 +343,3 @@ def choose_few(command: Command) -> Command:
     n = len(command.theta_2)
     places = np.linspace(0, n - 1, min(POSITIONS_WITH_REFERENCE, n))
     return command.part(np.unique(places.round().astype(int)))
-
-
-def evaluate_balls(scene: Scene, command: Command) -> list[dict[str, Any]]:
-    """Evaluate balls of the independent reference, by name, at each position."""
-    from flint import arb, ctx
-
-    from fourbar_validation.engines.balls import collect_inputs, compute_outputs
-
-    command = with_signs(scene.linkage, command)
-    with ctx.workprec(REFERENCE_BITS):
-        outputs = []
-        positions = zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)
-        for theta_2, branch in positions:
-            inputs = collect_inputs(scene, theta_2)
-            x = {name: arb(value) for name, value in inputs.items()}
-            outputs.append(compute_outputs(scene, branch, x) or {})
-        return outputs
-
-
-def compare_with_balls(
-    scene: Scene,
-    command: Command,
-    quantities: dict[str, Any],
-    balls: list[dict[str, Any]],
-) -> WorstErrors:
-    """Find the worst errors of an answer on their scales against balls."""
-    formulas = solve(scene, "force", at=command)
-    worst = {}
-    for name, parts in _PARTS.items():
-        sizes = scale_of(name, scene, formulas, formulas[name]).size.tolist()
-        errors = []
-        for size, ours, ball in zip(sizes, quantities[name], balls, strict=True):
-            exact = [ball.get(part) for part in parts]
-            if None not in exact:
-                pairs = zip(np.atleast_1d(ours).tolist(), exact, strict=True)
-                apart = [abs(float((one - other).mid())) for one, other in pairs]
-                errors.append(float(divide(math.hypot(*apart), size)))
-        worst[name] = find_greatest(errors)
-    return WorstErrors(**worst)
