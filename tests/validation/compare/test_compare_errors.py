@@ -214,6 +214,6 @@ def test_an_error_within_the_rounding_of_theta_2_is_taken_again():
         return compare(answer, SCENE, FORMULAS, ("torque",), **held)["torque"]
 
     assert judge().failed
-    again = judge(answer_nearby=lambda mask: {"torque": FORMULAS.torque})
+    again = judge(answer_nearby=lambda: {"torque": FORMULAS.torque})
     assert again.verdict == AGREES and "within the rounding of theta_2" in again.reason
     assert K * EPS <= again.allowed < 1e-6

@@ -139,7 +139,7 @@ def ask_nearby(scene, solution, command=None):
     """Ask the balls again, within the rounding of every theta_2."""
     command = command or fourbar.command(scene)
     nearby = make_answer_nearby(HARD_ENGINES[0], scene, command, solution)
-    return nearby(np.ones(len(command.angle), dtype=bool))
+    return nearby()
 
 
 def test_an_answer_nearby_is_one_within_the_rounding_of_theta_2():

@@ -5,7 +5,7 @@ The row states the position where the quantity is worst.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -70,12 +70,10 @@ Predicted = Callable[[str, Mask], Array | None]
 """Function that predicts the error of a quantity, in its unit, (n,). It matters at the
 positions of the mask alone. None: nothing predicts this quantity.
 """
-AnswerNearby = Callable[[Mask], dict[str, Array]]
-"""Function that evaluates every quantity again at the positions of a mask. theta_2 is
-varied within its rounding; elsewhere it is NaN.
+AnswerNearby = Callable[[], dict[str, Array]]
+"""Function that evaluates every quantity again where the formulas close the loop.
+theta_2 is varied within its rounding; elsewhere a quantity is NaN.
 """
-Scales = dict[str, tuple[Scale, Array]]
-"""Scale by the formulas and condition, (n,), by the quantity that has them."""
 
 _OF_THE_FORMULAS = (
     *DRY_FRICTION_QUANTITIES,
@@ -101,6 +99,10 @@ _OF_THE_LINE = {
 }
 """Quantities of a drive that exerts a force; each is compared if the quantity it maps
 to is compared or the engine answers it.
+"""
+_FOLLOWING = _OF_THE_LINE.keys() - {LINE.value}
+"""Those of them that are due where they follow from the angles and speeds answered. The
+force takes the place of the torque and is due itself.
 """
 _OF_FORCES = (*FORCE_NAMES, *DRY_FRICTION_QUANTITIES)
 _MOST_UNDECIDED = 0.5
@@ -143,20 +145,6 @@ class Demands(NamedTuple):
     """
 
 
-class _Judged(NamedTuple):
-    """The row of a quantity, and the numbers that it speaks for."""
-
-    row: Row
-    numbers: int = 0
-    """Numbers at positions where both close the loop."""
-    decidable: int = 0
-    """Those to which condition and N leave digits for any engine to be judged by, or at
-    a reversal, where either side is right.
-    """
-    decided: int = 0
-    """Those of them with a verdict: the engine predicts no error as large."""
-
-
 @dataclass
 class Comparison:
     """One answer held to the formulas."""
@@ -172,14 +160,6 @@ class Comparison:
     stricter of its condition and that of the formulas sets the allowed error; its scale
     stands in for that of an answer which has too few quantities for one.
     """
-    scales: Scales = field(default_factory=dict)
-    """Scales of `formulas`, conditions of it and `reference`, kept from an earlier
-    answer that was compared with them.
-    """
-
-    def __post_init__(self) -> None:
-        if self.reference is None:
-            self.scales = {}
 
     def rows(self) -> list[Row]:
         """Compare where the loop closes and each quantity.
@@ -197,18 +177,17 @@ class Comparison:
             names |= {
                 line
                 for line, quantity in _OF_THE_LINE.items()
-                if line in answer.quantities
-                or (quantity in names and self._follows(line))
+                if quantity in names or line in answer.quantities
             }
+        # numbers where both close the loop; those to which condition and N leave digits
+        # for any engine to be judged by, or at a reversal, where either side is right;
+        # those of them with a verdict: the engine predicts no error as large
+        self._counts = np.zeros(3, dtype=int)
+        self._closed = self.formulas.assembled & answer.assembled
         rows = [self._compare_assembled()]
-        counted = []
-        for name in filter(names.__contains__, STAGE_OF):
-            judged = self._compare(name)
-            if judged is not None:
-                rows.append(judged.row)
-                counted.append(judged[1:])
+        rows += filter(None, map(self._compare, filter(names.__contains__, STAGE_OF)))
         rows += [self._unmeasured("watch", FAILS, alarm) for alarm in answer.alarms]
-        numbers, decidable, decided = np.sum([(0, 0, 0), *counted], axis=0).tolist()
+        numbers, decidable, decided = self._counts.tolist()
         if numbers:  # an engine whose errors hide most of its numbers does not hold
             reason = f"{numbers - decided} of {numbers} numbers are undecided"
             if decidable < numbers:
@@ -243,14 +222,6 @@ class Comparison:
             answer.assembled,
         )
 
-    def _follows(self, line: str) -> bool:
-        """Tell whether a quantity of the drive is due from what is answered.
-
-        A force that drives takes the torque's place, and the others follow from angles
-        and speeds.
-        """
-        return line == LINE.value or getattr(self._solution, line, None) is not None
-
     @property
     def _who(self) -> tuple[str, str, str]:
         """Scene, engine and setting of its rows."""
@@ -260,53 +231,6 @@ class Comparison:
     def _solution(self) -> Solution | None:
         """Return the answer as a solution."""
         return make_reference(self.scene, self.answer)
-
-    @cached_property
-    def _answered_nearby(self) -> dict[str, Array]:
-        """Ask again near each position, once an error calls for it."""
-        assert self.demands.answer_nearby is not None
-        return self.demands.answer_nearby(self.formulas.assembled)
-
-    @cached_property
-    def _reversing(self) -> Mask:
-        """Positions at which dry friction reverses.
-
-        A force may have either of two values there.
-        """
-        tolerance = self.demands.tolerance
-        return mark_reversing(
-            self.scene,
-            self.formulas,
-            tolerance.factor,
-            in_time=tolerance.in_time,
-        )
-
-    @property
-    def _reversible(self) -> tuple[str, ...]:
-        """Quantities that may have two values where friction reverses."""
-        if self._may_jam:
-            return (*_OF_FORCES, "drive_condition")
-        return _OF_FORCES
-
-    @property
-    def _may_jam(self) -> bool:
-        """True if friction depends on the loads of pins."""
-        return any(effect.loaded_pins for effect in self.scene.effects)
-
-    @property
-    def _tells_of_jams(self) -> bool:
-        """True if the answer tells how near a jam is, where there may be one.
-
-        An engine without loads and friction cannot tell.
-        """
-        answered = "drive_condition" in self.answer.quantities
-        return answered or self._solution is None or not self._may_jam
-
-    @cached_property
-    def _closed(self) -> Mask:
-        """Positions where both close the loop."""
-        assert self.answer.assembled is not None
-        return self.formulas.assembled & self.answer.assembled
 
     def _unmeasured(self, quantity: str, verdict: str, reason: str) -> Row:
         """Make a row without numbers."""
@@ -332,48 +256,60 @@ class Comparison:
             self._who, "assembled", float(count) * differ, 0.0, reason, ours.theta_2
         )
 
-    def _compare(self, quantity: str) -> _Judged | None:
-        """Compare a quantity of the answer; None if neither side has it."""
-        if quantity == "drive_condition" and not self._tells_of_jams:
-            return None
+    def _compare(self, quantity: str) -> Row | None:
+        """Compare a quantity of the answer, and count its numbers.
+
+        None if neither side has it, or if it is none that is due of the answer.
+        """
         formulas = self.formulas
+        loaded = any(effect.loaded_pins for effect in self.scene.effects)
+        of_jams = loaded and quantity == "drive_condition"
         ours = getattr(formulas, quantity, None)
         theirs = self.answer.quantities.get(quantity)
         if theirs is None and self._solution is not None:
+            if of_jams:  # an engine without loads and friction cannot tell
+                return None
             theirs = getattr(self._solution, quantity)
-        if ours is None and theirs is None:  # the scene states positions only
+        # a scene of positions alone, or a line that does not follow from the answer
+        if theirs is None and (ours is None or quantity in _FOLLOWING):
             return None
         if ours is None or theirs is None:
             missing = "the formulas have no answer" if ours is None else "no answer"
-            return _Judged(self._unmeasured(quantity, FAILS, missing))
-        closed = int(np.count_nonzero(self._closed))
-        mask = self._closed & _mark_stated(quantity, formulas.status_code, ours)
+            return self._unmeasured(quantity, FAILS, missing)
+        closed = self._closed
+        self._counts[0] += np.count_nonzero(closed)
+        mask = closed & _mark_stated(quantity, formulas.status_code, ours)
         note = ""
-        if np.count_nonzero(mask) < closed:
-            unstated = _count(formulas.status_code[self._closed & ~mask])
+        if not np.array_equal(mask, closed):
+            unstated = _count(formulas.status_code[closed & ~mask])
             if not mask.any():
-                reason = f"{NO_VALUE}: {unstated}"
-                return _Judged(self._unmeasured(quantity, REFUSES, reason), closed)
+                return self._unmeasured(quantity, REFUSES, f"{NO_VALUE}: {unstated}")
             note = f"; not judged: {unstated}"
-        if self.demands.tolerance.in_time and quantity in FORCE_NAMES:
+        tolerance = self.demands.tolerance
+        if tolerance.in_time and quantity in FORCE_NAMES:
             mask &= mark_moving_drive(self.scene, formulas)
-        reversals = 0
-        if quantity in self._reversible:
+        if of_jams or quantity in _OF_FORCES:
             # at a reversal the forces of either side are right
-            reversals = int(np.count_nonzero(mask & self._reversing))
-            mask &= ~self._reversing
-        if reversals:
-            count = write_count(reversals, "position")
-            note += f"; {count} at which dry friction reverses not judged"
+            reversing = mask & mark_reversing(
+                self.scene, formulas, tolerance.factor, in_time=tolerance.in_time
+            )
+            mask &= ~reversing
+            if reversals := int(np.count_nonzero(reversing)):
+                self._counts[1:] += reversals
+                count = write_count(reversals, "position")
+                note += f"; {count} at which dry friction reverses not judged"
         if not mask.any():
             nowhere = f"{NO_POSITION} this quantity can be compared{note}"
-            row = self._unmeasured(quantity, UNDECIDED, nowhere)
-            return _Judged(row, closed, reversals, reversals)
+            return self._unmeasured(quantity, UNDECIDED, nowhere)
         errors = self._measure(quantity, ours, theirs, mask)
         worst = judge_errors(
             errors, self._predict(quantity, errors), self.demands.method
         )
-        row = Row(
+        decidable = worst.decided
+        if self.demands.of_itself:
+            decidable = int(np.count_nonzero(errors.decidable))
+        self._counts[1:] += decidable, worst.decided
+        return Row(
             *self._who,
             quantity,
             worst.error,
@@ -383,10 +319,6 @@ class Comparison:
             float(formulas.theta_2[worst.position]),
             worst.condition,
         )
-        decidable = worst.decided
-        if self.demands.of_itself:
-            decidable = int(np.count_nonzero(errors.decidable))
-        return _Judged(row, closed, reversals + decidable, reversals + worst.decided)
 
     def _measure(
         self, quantity: str, ours: Array, theirs: Array, mask: Mask
@@ -406,9 +338,10 @@ class Comparison:
         beyond = mask & (error > allowed)
         again = np.full(error.shape, np.nan)
         if self.demands.answer_nearby is not None and beyond.any():
-            again = find_error(quantity, ours, self._answered_nearby[quantity], unit)
+            nearby = self.demands.answer_nearby()[quantity]
+            again = np.where(beyond, find_error(quantity, ours, nearby, unit), again)
         return Errors(
-            error=np.where(beyond, np.fmin(error, again), error),
+            error=np.fmin(error, again),
             allowed=allowed,
             scale=scale._replace(size=unit),
             relative=~vanishes,
@@ -416,7 +349,6 @@ class Comparison:
             mask=mask,
             tolerance=tolerance,
             again=again,
-            settled=int(np.count_nonzero(beyond & (again <= allowed))),
         )
 
     def _predict(self, quantity: str, errors: "Errors") -> Array | None:
@@ -438,18 +370,15 @@ class Comparison:
         return np.nan_to_num(share, nan=0.0, posinf=np.inf)
 
     @cached_property
-    def _sizes(self) -> TermSizes:
-        """Return the sizes of the formulas' quantities."""
-        return TermSizes(self.scene, self.formulas)
+    def _sizes(self) -> tuple[TermSizes, TermSizes | None]:
+        """Return the sizes of the formulas' quantities, and of the answer's.
 
-    @cached_property
-    def _answered_sizes(self) -> TermSizes | None:
-        """Return the sizes of the answer's quantities, or else of the reference's."""
-        for solution in (self._solution, self.reference):
-            sizes = None if solution is None else size_answer(self.scene, solution)
-            if sizes is not None:
-                return sizes
-        return None
+        Those of the reference stand in where the answer has too few.
+        """
+        scene = self.scene
+        answered = size_answer(scene, self._solution)
+        answered = answered or size_answer(scene, self.reference)
+        return TermSizes(scene, self.formulas), answered
 
     def _scale(self, quantity: str, ours: Array) -> tuple[Scale, Array]:
         """Return scale and condition of a quantity at each position, (n,).
@@ -457,16 +386,14 @@ class Comparison:
         Of formulas and another derivation the stricter one counts: the larger
         condition, and the pair of size and N that allows less.
         """
-        if quantity not in self.scales:
-            link = self.scene.linkage
-            condition = find_condition(quantity, link, self.formulas)
-            reference = self._solution if self.reference is None else self.reference
-            if reference is not None:
-                theirs = find_condition(quantity, link, reference)
-                condition = np.fmin(np.fmax(condition, theirs), 1.0)
-            self.scales[quantity] = self._sizes.scale(quantity, ours), condition
-        scale, condition = self.scales[quantity]
-        answered = self._answered_sizes
+        link = self.scene.linkage
+        condition = find_condition(quantity, link, self.formulas)
+        reference = self._solution if self.reference is None else self.reference
+        if reference is not None:
+            theirs = find_condition(quantity, link, reference)
+            condition = np.fmin(np.fmax(condition, theirs), 1.0)
+        sizes, answered = self._sizes
+        scale = sizes.scale(quantity, ours)
         if answered is not None:
             values = getattr(answered.solution, quantity)
             if values is not None:
@@ -492,8 +419,6 @@ class Errors:
     """Tolerance that the errors are held to."""
     again: Array
     """Errors of a second answer within the rounding of theta_2; NaN where not asked."""
-    settled: int = 0
-    """Number of positions at which that answer agrees."""
 
     @cached_property
     def decidable(self) -> Mask:
@@ -604,8 +529,9 @@ def judge_errors(
             limit = f"more than {MOST_ALLOWED:g} allowed"
             count = write_count(int(undecided), "position")
             why += f"; {count} with {limit} not judged"
-        if errors.settled:
-            count = write_count(errors.settled, "position")
+        settled = int(np.count_nonzero(errors.again <= errors.allowed))
+        if settled:
+            count = write_count(settled, "position")
             why += f"; {count} within the rounding of theta_2"
     return _WorstPosition(
         at,
@@ -627,13 +553,9 @@ def _mark_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
         # A jam at rest concerns the motion that would begin, so its forces are stated.
         # Forces with several solutions are not: an engine may find another one, or not
         # converge.
-        jammed = code == JAMMED
-        if jammed.any():
-            jammed &= np.isfinite(magnitude(ours))
+        jammed = (code == JAMMED) & np.isfinite(magnitude(ours))
         return np.asarray(jammed | (code == OK))
-    beyond = code == OVERFLOW
-    if beyond.any():
-        beyond &= np.isnan(magnitude(ours))
+    beyond = (code == OVERFLOW) & np.isnan(magnitude(ours))
     # on a change point no engine can tell the limits of an assembly
     unstated = beyond | (code == SINGULAR) | (code == CHANGE_POINT)
     if quantity == "drive_condition":  # it says how near a jam is

@@ -357,8 +357,10 @@ def _swing_points(
     }
 
 
-def size_answer(scene: Scene, answered: Solution) -> TermSizes | None:
+def size_answer(scene: Scene, answered: Solution | None) -> TermSizes | None:
     """Return the sizes of an answer; None without the motion that the sums need."""
+    if answered is None:
+        return None
     if answered.at.speed is not None:
         if any(getattr(answered, name) is None for name in RATES):
             return None

@@ -390,10 +390,12 @@ def make_answer_nearby(
     ):
         return None
 
-    def answer(mask: Mask) -> dict[str, Array]:
+    @cache
+    def answer() -> dict[str, Array]:
         adapter = engine.start()
-        out = make_blank(len(mask), COMPARED_QUANTITIES)
-        for i in np.flatnonzero(mask & np.isfinite(formulas.sin_mu)).tolist():
+        out = make_blank(len(formulas), COMPARED_QUANTITIES)
+        told = formulas.assembled & np.isfinite(formulas.sin_mu)
+        for i in np.flatnonzero(told).tolist():
             shift = shift_to(
                 scene.linkage,
                 float(command.theta_2[i]),

@@ -152,8 +152,8 @@ def compare_answer(
     scene = question.scene
     formulas = question.solution
     held = make_demands(engine, scene, question.at, answer, formulas)
-    further = (question.reference, question.scales)
-    comparison = Comparison(question.name, scene, answer, formulas, held, *further)
+    reference = question.reference
+    comparison = Comparison(question.name, scene, answer, formulas, held, reference)
     rows = comparison.rows()
     assembled = answer.assembled
     # an answer of another length has a row that fails

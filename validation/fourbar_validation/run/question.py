@@ -17,7 +17,6 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import Answer, explain_refusal
-from fourbar_validation.compare.compare import Scales
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.compare.rows import (
     FORMULAS,
@@ -79,8 +78,6 @@ class Question:
     timings: list[Timing] = field(default_factory=list)
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """Answer of each engine, by its name, and the seconds that it took."""
-    scales: Scales = field(default_factory=dict)
-    """Size and condition of each quantity that was compared."""
 
     @cached_property
     def solution(self) -> Solution:
