@@ -4,10 +4,11 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ SHOWN_PARTS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
+class Solution(Quantities):
     """The answer of the formulas at n positions, in SI units and radians.
 
     For a study it is at n positions of each of m linkages. Scalars have shape (n,),
@@ -67,9 +68,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     quantity has no value (see `status`), None a quantity that was not requested.
     """
 
-    title: str
-    drive_bar: int
-    """2, 3 or 4; None where the drive exerts a force."""
+    at: Command
+    """Positions that were solved, with what is commanded."""
+    stated: Scene
+    """Scene that was solved, or that of a study, whose numbers that vary are (m, 1)."""
     status_code: NDArray[np.uint8]
     """0 ok: every quantity that was requested is a number. 1 not_assembled: all but
     what is commanded is NaN. 2 singular (velocities are 0/0); of friction that depends
@@ -95,24 +97,8 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """Velocities of the scene's points, m/s."""
     acceleration: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Accelerations of the scene's points, m/s^2."""
-    ground: tuple[Any, Any] = field(default=(), kw_only=True)  # type: ignore[assignment]
-    """Length and angle of the ground bar, m and rad. Of a study (m, 1) each where they
-    vary.
-    """
     scene: Scene = field(default=None, kw_only=True)  # type: ignore[assignment]
     """Scene that was solved; None for a study."""
-    stated: Scene = field(default=None, compare=False, kw_only=True)  # type: ignore[assignment]
-    """Scene that was solved, or that of a study, whose numbers that vary are (m, 1)."""
-    origin: tuple[Any, Any] = field(default=(0.0, 0.0), kw_only=True)
-    """Place of O2 in the coordinates of the scene's drawing, m. Of a study (m, 1) each
-    where they vary.
-    """
-    lengths: Any = field(default=(), kw_only=True)
-    """Lengths of ground, input, coupler and output, m. Of a study (m, 1) each where
-    they vary.
-    """
-    drive: "ForceDrive | None" = field(default=None, kw_only=True)
-    """Drive of the scene that exerts a force; None: a couple drives a bar."""
     change_points: tuple[float, ...] | None = field(default=None, kw_only=True)
     """Times at which a free motion passed a change point, s. Another motion was
     possible there.
@@ -121,15 +107,10 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """Instants of a free motion, and those between at which an angle of it is largest
     or smallest.
     """
-    command_at: Callable[[Array], Command] | None = field(
-        default=None, compare=False, kw_only=True
-    )
+    command_at: Callable[[Array], Command] | None = field(default=None, kw_only=True)
     """Function that returns a free motion at other times, (n,) rising from 0, s,
     without integrating it again.
     """
-
-    at: Command = field(default=None, kw_only=True)  # type: ignore[assignment]  # by `solve`
-    """Positions that were solved, with what is commanded."""
 
     @classmethod
     def of(cls, **values: Any) -> Self:
@@ -162,16 +143,6 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
     __iter__: ClassVar[None] = None  # neither positions nor names
 
-    def __eq__(self, other: object) -> bool:
-        """Return whether all fields are equal, number by number and NaN to NaN."""
-        if not isinstance(other, Solution):
-            return NotImplemented
-        return all(
-            _is_equal(getattr(self, part.name), getattr(other, part.name))
-            for part in fields(self)
-            if part.compare
-        )
-
     def __repr__(self) -> str:
         """Say in three lines what it holds."""
         on = f"on bar {self.drive_bar}"
@@ -189,6 +160,29 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
     def _repr_html_(self) -> Any:
         return load_show("notebook").show_solution(self)
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.stated.title
+
+    @property
+    def drive_bar(self) -> int:
+        """Bar of the drive, 2, 3 or 4; None where the drive exerts a force."""
+        return self.stated.drive_bar
+
+    @cached_property
+    def drive(self) -> "ForceDrive | None":
+        """Drive of the scene that exerts a force; None: a couple drives a bar."""
+        return self.stated.settled_drive()
+
+    @property
+    def origin(self) -> tuple[Any, Any]:
+        """Place of O2 in the coordinates of the scene's drawing, m.
+
+        Of a study (m, 1) each where they vary.
+        """
+        return self.stated.origin
 
     @property
     def commanded(self) -> str:
@@ -257,30 +251,17 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Raises DependencyError where pandas is not installed.
         """
-        evaluated = [
-            column
-            for column in _list_scalars(self, require_units(units))
-            if column.values is not None
-        ]
-        columns = {column.heading: column.values for column in evaluated}
-        table = make_data_frame({**_list_leading(self), **columns})
-        table.attrs["units"] = {column.heading: column.unit for column in evaluated}
+        columns = _list_leading(self)
+        units_of = {}
+        for heading, (unit, values) in _list_scalars(
+            self, require_units(units)
+        ).items():
+            if values is not None:
+                columns[heading] = values
+                units_of[heading] = unit
+        table = make_data_frame(columns)
+        table.attrs["units"] = units_of
         return table
-
-
-def _is_equal(one: Any, another: Any) -> bool:
-    """Return whether two parts of a solution are equal, arrays in them too."""
-    if isinstance(one, np.ndarray) or isinstance(another, np.ndarray):
-        has_nan = np.issubdtype(np.asarray(one).dtype, np.floating)
-        return np.array_equal(one, another, equal_nan=has_nan)
-    if isinstance(one, dict) and isinstance(another, dict):
-        if one.keys() != another.keys():
-            return False
-        another = tuple(another[name] for name in one)
-        one = tuple(one.values())
-    if isinstance(one, tuple) and isinstance(another, tuple):
-        return len(one) == len(another) and all(map(_is_equal, one, another))
-    return bool(one == another)
 
 
 def where_assembled(solution: Solution, values: Any) -> Array:
@@ -350,9 +331,8 @@ def write_csv(
     scalars: Mapping[str, Array | None] = chosen or {}
     columns: dict[str, Iterable[Any]] = {}
     if not chosen:
-        scalars = {
-            column.heading: column.values for column in _list_scalars(solution, units)
-        }
+        of_all = _list_scalars(solution, units)
+        scalars = {heading: values for heading, (_, values) in of_all.items()}
         columns |= _list_leading(solution)
 
     def write_cell(number: float) -> str:
@@ -371,7 +351,7 @@ def write_csv(
     return text.getvalue()
 
 
-def _list_leading(solution: Solution) -> dict[str, list[Any]]:
+def _list_leading(solution: Solution) -> dict[str, Any]:
     """List the first columns of a table, one entry for each position.
 
     The table of a study begins with the number of the member.
@@ -389,28 +369,20 @@ def _list_leading(solution: Solution) -> dict[str, list[Any]]:
     }
 
 
-class _ScalarColumn(NamedTuple):
-    """Column of numbers: a quantity, or a component or the size of one."""
-
-    heading: str
-    """`F12_x`, or `F12_x [lbf]`."""
-    unit: str
-    """Unit of the values."""
-    values: Array | None
-    """Value at each position; None for what was not evaluated."""
-
-
-def _list_scalars(solution: Solution, units: Conversion) -> list[_ScalarColumn]:
+def _list_scalars(
+    solution: Solution, units: Conversion
+) -> dict[str, tuple[str, Array | None]]:
     """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
 
-    Magnitudes of pin forces are included, and the time where it is known. In other
-    units than SI every heading names its own.
+    Magnitudes of pin forces are included, and the time where it is known. Under each
+    heading, which in other units than SI names its own ("F12_x [lbf]"), are the unit
+    and the value at each position; None for what was not evaluated.
     """
     quantities = {
         name: find_values(solution, name, units) for name in _list_quantities(solution)
     }
     quantities |= load_show("derived").list_derived(solution, units)
-    columns = []
+    columns = dict[str, tuple[str, Array | None]]()
     for name, values in quantities.items():
         unit, _ = find_unit_in(find_unit_of_quantity(name), units)
         named = f" [{unit}]" if units and unit != "1" else ""
@@ -418,10 +390,10 @@ def _list_scalars(solution: Solution, units: Conversion) -> list[_ScalarColumn]:
         for part in sorted(parts, key=lambda part: part[0] == "|"):  # sizes come last
             # members in turn
             flat = None if values is None else parts[part].ravel()
-            columns.append(_ScalarColumn(f"{part}{named}", unit, flat))
+            columns[f"{part}{named}"] = unit, flat
     time = compute_times(solution.scene, solution.at)
     if time is not None:
-        columns.append(_ScalarColumn("time [s]" if units else "time", "s", time))
+        columns["time [s]" if units else "time"] = "s", time
     return columns
 
 

@@ -6,10 +6,9 @@ The evaluation ends after the stage that is asked for.
 import cmath
 from collections.abc import Iterator, KeysView, Mapping
 from functools import cache
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, Case
@@ -120,89 +119,149 @@ def solve(
         of_release["command_at"] = released.command_at
     else:
         at = command(scene)
-    request = SolveRequest.of(scene, at, stage, out)
+    results = Results(scene, at, stage, out)
     with np.errstate(all="ignore"):
         if isinstance(at.origin, ReleaseOrigin):
-            results = _solve_released(scene, at.origin, request)
+            results.fill_released(scene, at.origin)
         else:
             case = Case.of(scene, at.bar, side)
-            if request.asks_forces and scene.counts_turns:
+            if results.asks_forces and scene.counts_turns:
                 stated = command(scene)
                 case = case.begin_with(stated if stated.bar == at.bar else at)
-            alone = _solve_alone(case, at, request)
-            results = alone or Results(request)
-            blocks = () if alone else split(len(at.angle), request.block)
-            for rows in blocks:
-                block = at.part(rows)
-                # kept until the next block is evaluated: its memory is used again
-                evaluated = evaluate(case, block, request.last_stage, request.wanted)
-                results.store(case, evaluated, (rows,))
-    return make_solution(scene, at, results, solved=scene, **of_release)
+            if not results.fill_alone(case, at):
+                results.allocate()
+                for rows in split(len(at.angle), results.block):
+                    results.fill(case, at.part(rows), (rows,))
+    return make_solution(scene, at, results, **of_release)
 
 
-class SolveRequest(NamedTuple):
-    """Quantities that are evaluated, and the number of positions."""
+class Results:
+    """What is evaluated at the positions of a command, and the arrays of it.
 
-    shape: tuple[int, ...]
-    """Shape of the positions."""
-    last_stage: int
-    """Number of the last stage evaluated."""
-    wanted: KeysView[str]
-    """Names of the quantities."""
-    out: Mapping[str, Array]
-    """Arrays of the caller's to write into."""
+    Status codes and arrays are filled block by block.
+    """
 
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         scene: Scene,
         at: Command,
         stage: str | None,
         out: Mapping[str, Array] | None,
-    ) -> Self:
-        """Make the request of the arguments of `solve`; an InputError as there.
+    ) -> None:
+        """Take the arguments of `solve`; an InputError as there.
 
         If a bar other than the input is commanded, theta_2 and sin_mu, whose sign is
         the branch, are evaluated too.
         """
-        shape = at.angle.shape
+        self.shape = at.angle.shape
+        self.out = {} if out is None else out
         points = tuple(point.name for point in scene.points)
+        wanted: KeysView[str]
         if out is None:
             if stage is None:
                 stage = "position" if at.speed is None else "force"
             if not isinstance(stage, str) or stage not in STAGES:
                 raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
-            last_stage = STAGES.index(stage)
-            wanted = _list_evaluated(last_stage, _list_absent(scene), points)
+            self.last_stage = STAGES.index(stage)
+            wanted = _list_evaluated(self.last_stage, _list_absent(scene), points)
         else:
             foreign = _list_foreign(scene)
             stages = _list_stages(points)
             allowed = [name for name in stages if name not in foreign]
-            _require_out(out, shape, allowed)
+            _require_out(out, self.shape, allowed)
             wanted = out.keys()
             needed = {STAGES.index(stages[name]) for name in out}
-            last_stage = max(needed, default=0)
-        if last_stage > 0 and at.speed is None:
+            self.last_stage = max(needed, default=0)
+        if self.last_stage > 0 and at.speed is None:
             raise InputError(
                 f"motion.omega_{at.bar}",
                 None,
-                f"is needed for the stage {STAGES[last_stage]!r}",
+                f"is needed for the stage {STAGES[self.last_stage]!r}",
             )
         if at.bar != 2:
             wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
-        return cls(shape, last_stage, wanted, out or {})
+        self.wanted = wanted
+        self.codes = np.zeros(0, dtype=np.uint8)
+        self.arrays: dict[str, Array] = {}
 
     @property
     def block(self) -> int:
         """Number of positions evaluated at a time."""
-        if self.last_stage < ERROR:
-            return POSITIONS_OF_A_BLOCK
-        return _LONG_BLOCK
+        return POSITIONS_OF_A_BLOCK if self.last_stage < ERROR else _LONG_BLOCK
 
     @property
     def asks_forces(self) -> bool:
         """Return True if forces are evaluated."""
         return self.last_stage >= FORCE
+
+    def allocate(self) -> None:
+        """Make the arrays, those of the caller's apart."""
+        self.codes = np.zeros(self.shape, dtype=np.uint8)
+        for name in self.wanted:
+            shape = self.shape if name in SCALARS else (*self.shape, 2)
+            given = self.out.get(name)
+            self.arrays[name] = np.empty(shape) if given is None else given
+
+    def fill(self, case: Case, at: Command, index: PositionIndex) -> None:
+        """Evaluate some positions."""
+        # kept until the next block is evaluated: its memory is used again
+        self.kept = evaluate(case, at, self.last_stage, self.wanted)
+        self._store(case, self.kept, index)
+
+    def _store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
+        """Store what was evaluated at some positions.
+
+        Values that are no number have the status that says so.
+        """
+        withhold_infinite(case, evaluated)
+        self.codes[index] = evaluated.codes
+        for name, value in evaluated.values.items():
+            array = self.arrays[name]
+            if name in SCALARS:
+                array[index] = value
+            else:
+                array[*index, 0] = value.real
+                array[*index, 1] = value.imag
+
+    def fill_alone(self, case: Case, at: Command) -> bool:
+        """Evaluate a single position in plain numbers.
+
+        Arrays of one entry cost several times as much. False for several positions, and
+        where any result is no number: there NumPy goes on with inf and NaN, and
+        statuses follow.
+        """
+        if self.shape != (1,) or self.out:
+            return False
+        # Python's own numbers halve a formula's time
+        angle: Any = at.angle.item()
+        position = at.part((0,))._replace(angle=angle)
+        try:
+            codes, values, _ = evaluate(case, position, self.last_stage, self.wanted)
+        except ArithmeticError:
+            return False
+        table = np.array([*values.values()], dtype=complex)
+        if not cmath.isfinite(np.vdot(table, table)):
+            return False
+        self.codes = np.array([codes], dtype=np.uint8)
+        vectors = table.view(float).reshape(-1, 1, 2)
+        scalars = vectors[:, :, 0]
+        for row, name in enumerate(values):
+            self.arrays[name] = scalars[row] if name in SCALARS else vectors[row]
+        return True
+
+    def fill_released(self, scene: Scene, released: ReleaseOrigin) -> None:
+        """Evaluate a released motion, as the commands that it is made of."""
+        self.allocate()
+        for index, at, side in released.commands():
+            case = Case.of_released(scene, at.bar, side)
+            evaluated = evaluate_released(
+                case,
+                at,
+                scene.drive,
+                self.last_stage,
+                self.wanted,
+            )
+            self._store(case, evaluated, (index,))
 
 
 def _require_out(out: Any, shape: tuple[int, ...], allowed: list[str]) -> None:
@@ -220,83 +279,6 @@ def _require_out(out: Any, shape: tuple[int, ...], allowed: list[str]) -> None:
                 (array.shape, str(array.dtype)),
                 f"must be float64 of shape {wanted}, writeable",
             )
-
-
-class Results:
-    """Status codes and arrays of all positions, which are filled block by block."""
-
-    def __init__(self, request: SolveRequest) -> None:
-        shape = request.shape
-        self.codes: NDArray[np.uint8] = np.zeros(shape, dtype=np.uint8)
-        self.arrays: dict[str, Array] = {}
-        for name in request.wanted:
-            shape_of_one = shape if name in SCALARS else (*shape, 2)
-            given = request.out.get(name)
-            self.arrays[name] = np.empty(shape_of_one) if given is None else given
-
-    def store(self, case: Case, evaluated: Evaluated, index: PositionIndex) -> None:
-        """Store what was evaluated at some positions.
-
-        Values that are no number have the status that says so.
-        """
-        withhold_infinite(case, evaluated)
-        self.codes[index] = evaluated.codes
-        for name, value in evaluated.values.items():
-            array = self.arrays[name]
-            if name in SCALARS:
-                array[index] = value
-            else:
-                array[*index, 0] = value.real
-                array[*index, 1] = value.imag
-
-
-def _solve_alone(case: Case, at: Command, request: SolveRequest) -> Results | None:
-    """Solve a single position in plain numbers.
-
-    Arrays of one entry cost several times as much. None for several positions, and
-    where any result is no number: there NumPy goes on with inf and NaN, and statuses
-    follow.
-    """
-    if request.shape != (1,) or request.out:
-        return None
-    # Python's own numbers halve a formula's time
-    angle: Any = at.angle.item()
-    position = at.part((0,))._replace(angle=angle)
-    try:
-        codes, values, _ = evaluate(case, position, request.last_stage, request.wanted)
-    except ArithmeticError:
-        return None
-    table = np.array([*values.values()], dtype=complex)
-    if not cmath.isfinite(np.vdot(table, table)):
-        return None
-    results = Results.__new__(Results)
-    results.codes = np.array([codes], dtype=np.uint8)
-    vectors = table.view(float).reshape(-1, 1, 2)
-    scalars = vectors[:, :, 0]
-    results.arrays = {}
-    for row, name in enumerate(values):
-        results.arrays[name] = scalars[row] if name in SCALARS else vectors[row]
-    return results
-
-
-def _solve_released(
-    scene: Scene,
-    released: ReleaseOrigin,
-    request: SolveRequest,
-) -> Results:
-    """Solve a released motion, as the commands of bars 2 and 4 that it is made of."""
-    results = Results(request)
-    for index, at, side in released.commands():
-        case = Case.of_released(scene, at.bar, side)
-        evaluated = evaluate_released(
-            case,
-            at,
-            scene.drive,
-            request.last_stage,
-            request.wanted,
-        )
-        results.store(case, evaluated, (index,))
-    return results
 
 
 def split(size: int, most: int) -> Iterator[slice]:
@@ -324,9 +306,9 @@ def _require_command_at(at: Command) -> None:
             continue
         is_number = isinstance(value, np.ndarray | np.number | float | int)
         numbers = np.asarray(value if is_number else None)
-        is_for_each = isinstance(value, np.ndarray) and numbers.shape == each
         is_one_rate = name in (omega, alpha) and not numbers.shape
-        if numbers.dtype.kind not in "iuf" or not (is_for_each or is_one_rate):
+        fits = numbers.shape == each or is_one_rate
+        if numbers.dtype.kind not in "iuf" or not fits:
             raise InputError(f"at.{name}", value, f"must be numbers, shape {each}")
     if (np.abs(at.branch) != 1).any():
         raise InputError("at.branch", at.branch, f"{A_BRANCH} at each position")
@@ -370,17 +352,12 @@ def make_solution(
     scene: Scene,
     at: Command,
     results: Results,
-    *,
-    solved: Scene | None = None,
     **of_release: Any,
 ) -> Solution:
     """Put the arrays of a solution in their places.
 
-    Parameters
-    ----------
-    solved : the scene, or None for a study, whose numbers are arrays.
-    of_release : fields of a free motion: `change_points`, `with_extremes` and
-        `command_at`.
+    `of_release`: fields of a free motion, `change_points`, `with_extremes` and
+    `command_at`.
     """
     quantities: dict[str, Any] = dict(results.arrays)
     commanded = COMMAND_NAMES[at.bar][0]
@@ -407,8 +384,6 @@ def make_solution(
     else:
         branch = np.where(np.abs(sine) > 0.0, np.sign(sine), at.branch)
     return Solution.of(
-        title=scene.title,
-        drive_bar=scene.drive_bar,
         status_code=results.codes,
         branch=np.array(branch, dtype=np.int8),
         theta_2=quantities.pop("theta_2", theta_2),
@@ -417,12 +392,8 @@ def make_solution(
         points=of_points[""],
         velocity=of_points["v_"],
         acceleration=of_points["a_"],
-        ground=(scene.linkage.ground, scene.linkage.ground_angle),
-        scene=solved,
+        scene=scene if theta_2.ndim == 1 else None,
         stated=scene,
-        origin=scene.origin,
-        lengths=scene.linkage.lengths,
-        drive=scene.settled_drive(),
         **of_release,
         at=at,
     )

@@ -93,10 +93,10 @@ def _compute_ratio(solution: Solution, bar: int) -> Array:
     omega_3/omega_2 = -[A x (B - O4)] / [(B - A) x (B - O4)],
     omega_4/omega_2 = [A x (B - A)] / [(B - O4) x (B - A)].
     """
-    length, angle = solution.ground
+    linkage = solution.stated.linkage
     A = solution.A[..., 0] + 1j * solution.A[..., 1]
     B = solution.B[..., 0] + 1j * solution.B[..., 1]
-    O4 = length * np.exp(1j * np.asarray(angle))
+    O4 = linkage.ground * np.exp(1j * np.asarray(linkage.ground_angle))
     if bar == 3:
         by_pins = -cross(A, B - O4) / cross(B - A, B - O4)
     else:

@@ -117,7 +117,7 @@ def is_once_round(solution: Solution) -> bool:
     angle = solution.at.angle
     if len(angle) == 1:
         return False
-    period = float(count_turns(solution.lengths, solution.at.bar))
+    period = float(count_turns(solution.stated.linkage.lengths, solution.at.bar))
     turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi * period)
     if turns <= 0.5 or not np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0):
         return False

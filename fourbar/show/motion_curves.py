@@ -440,7 +440,9 @@ def _list_position_curves(solution: Solution) -> _Curves:
     curves = {name: (getattr(solution, name), asked) for name in _POSITION_CURVES}
     if solution.stroke is not None:
         stroke = where_assembled(solution, solution.stroke)
-        asked = Wanted(SHOWN_AS_ZERO * max(solution.lengths), ranged=True)
+        asked = Wanted(
+            SHOWN_AS_ZERO * max(solution.stated.linkage.lengths), ranged=True
+        )
         curves["stroke"] = stroke, asked
     return curves
 
@@ -464,7 +466,7 @@ def _list_curves(solution: Solution) -> _Curves:
         kept = drop_rounding(load, largest) != 0.0
         force = np.where(kept[:, None], getattr(solution, name), 0.0)
         curves[name] = force, Wanted(rounding, integrated=True)
-    asked = Wanted(rounding * max(solution.lengths))
+    asked = Wanted(rounding * max(solution.stated.linkage.lengths))
     for bar, bending in compute_bending(solution).items():
         curves[f"bending_{bar}"] = np.abs(bending.moment), asked
     drive = read_drive_demand(solution)

@@ -63,8 +63,9 @@ def instant_centres(
             raise InputError(name, value, "must be left out: the positions are stated")
     solution = solve(of, "position") if isinstance(of, Scene) else of
     A, B = (v[..., 0] + 1j * v[..., 1] for v in (solution.A, solution.B))
-    length, angle = solution.ground
-    O4 = length * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
+    linkage = solution.stated.linkage
+    angle = linkage.ground_angle
+    O4 = linkage.ground * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
     along = [vector / np.abs(vector) for vector in (O4, A, B - A, B - O4)]
     return locate_centres(O4, A, B, *along)
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.evaluation.evaluate import evaluate
 from fourbar.linkage import BAR_NAMES, convert_to_unit
 from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array
 from fourbar.scene import Command, Scene, command
@@ -17,7 +16,7 @@ from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit_of_key
 from fourbar.scene.scene import command_stroke
 from fourbar.solution import Solution
-from fourbar.solving import Results, SolveRequest, make_solution, split
+from fourbar.solving import Results, make_solution, split
 from fourbar.studies.keys import (
     COMMAND_KEYS,
     command_key,
@@ -100,23 +99,17 @@ def solve_some(
 
     Effects begin where the whole motion of a member does.
     """
-    request = SolveRequest.of(study.scene, at, stage, out)
-    results = Results(request)
-    evaluated = None
-    m, n = request.shape
+    results = Results(study.scene, at, stage, out)
+    results.allocate()
+    m, n = results.shape
     with np.errstate(all="ignore"):
-        for rows in split(m, max(1, request.block // n)):
+        for rows in split(m, max(1, results.block // n)):
             case = study.case(rows, side)
-            if request.asks_forces and study.scene.counts_turns:
+            if results.asks_forces and study.scene.counts_turns:
                 case = study.begin(case, rows)
-            for columns in split(n, request.block):
+            for columns in split(n, results.block):
                 positions = take_positions(at, rows, columns)
-                # kept until the next block is evaluated, so that its memory is used
-                # again
-                evaluated = evaluate(
-                    case, positions, request.last_stage, request.wanted
-                )
-                results.store(case, evaluated, (rows, columns))
+                results.fill(case, positions, (rows, columns))
     members = {key: values[:, None] for key, values in study.values.items()}
     solution = make_solution(replace_numbers(study.scene, members), at, results)
     # what a scene would refuse, and strokes that a cylinder cannot have

@@ -318,15 +318,7 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         known["drive_condition"] = np.abs(
             np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one)
         )
-    return Solution(
-        scene.title,
-        scene.drive_bar,
-        np.full(n, OK, dtype=np.uint8),
-        at.branch,
-        **known,
-        drive=drive,
-        at=at,
-    )
+    return Solution(at, scene, np.full(n, OK, dtype=np.uint8), at.branch, **known)
 
 
 def _swing_points(

@@ -231,6 +231,4 @@ def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
         return value[index] if isinstance(value, np.ndarray) else value
 
     taken = {one.name: take(getattr(study, one.name)) for one in fields(study)}
-    return Solution(
-        **taken | {"at": study.at.part(index), "ground": None, "lengths": None}
-    )
+    return Solution(**taken | {"at": study.at.part(index)})

@@ -169,7 +169,6 @@ def _compare_part(engine: Engine, driven: Question) -> list[Row]:
         driven.solution,
         condition=reference.condition,
         drive_condition=reference.drive_condition,
-        drive_bar=2,
         at=driven.at,
     )
     names = tuple(name for name in UNKNOWNS if name in engine.answers)
