@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pytest import importorskip, mark, raises
 
 import fourbar
-from fourbar import InputError, Point, solve
+from fourbar import InputError, Motion, Point, solve
 from fourbar.solution import unwrap
 from tests.support.scenes import crank_rocker
 
@@ -42,6 +42,16 @@ def test_a_scene_without_a_title_leaves_no_empty_quotes():
     )
     assert named.startswith("Solution 'press': ")
     assert unnamed.startswith("Solution: ")
+
+
+def test_one_position_is_written_into_an_array():
+    scene = crank_rocker(motion=Motion(theta_3=0.8, branch=-1))
+    place = np.empty((1, 2))
+    solution = solve(scene, out={"A": place})
+    whole = solve(scene)
+    assert_allclose(place, whole.A)
+    assert solution.branch == whole.branch
+    assert "torque" not in whole.to_pandas()
 
 
 def test_a_data_frame_names_the_unit_of_each_column():

@@ -153,6 +153,7 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
     study = vary(scene(), {"motion.theta_2": theta_2, "lengths.input": [0.1, 0.12]})
     out = {"torque": np.zeros((2, 3)), "a_G3": np.zeros((2, 2, 3)).swapaxes(1, 2)}
     solution = solve(study, out=out)
+    assert solution.scene is None
     assert solution.torque is out["torque"] and solution.F12 is None
     for member, length in enumerate((0.1, 0.12)):
         values = {"lengths.input": [length] * 2}
