@@ -65,128 +65,70 @@ SINGLE_CALLS = 20
 """Calls of one position each."""
 _PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
-ALL = "formulas, all 11 unknowns"
-_ANGLES_ALONE = "positions only"
-_SYSTEM = "13x13 assembled and solved"
-FLOOR_OF_TIMES = "floor: tangent, root, two arctan"
-TO_FORCES = "solve to forces, points too"
-WITH_ERROR_BARS = "solve with error bars"
-ONE_POSITION = "one position to forces"
-JUDGED_SCENE = "a scene judged by the exact engines"
-_JUDGED_BY_POSITION = "a judged scene / one position"
-
-
-class _SpeedLimit(NamedTuple):
-    """Limit of a row of the table, and the reason for it.
-
-    A limit is on a ratio of times, which is the same with and without AVX-512.
-    """
-
-    sign: str
-    bound: float
-    reason: str
-    of: str = ""
-    over: str = ""
-    """The rows whose ratio it is."""
-
-    def holds(self, measured: float) -> bool:
-        """Compare a measured number with the limit; NaN does not hold."""
-        if self.sign == ">=":
-            return measured >= self.bound
-        return measured <= self.bound
-
-
 SPEED_LIMITS = {
-    "13x13 / formulas": _SpeedLimit(
-        ">=",
-        17.5,
-        "closed formulas are worth several times the system that they eliminate",
-        _SYSTEM,
-        ALL,
+    "formulas / 13x13": (
+        0.057,
+        "closed formulas are worth many times the system that they eliminate",
     ),
-    "formulas / positions only": _SpeedLimit(
-        ">=",
-        1.3,
+    "angles alone / formulas": (
+        0.77,
         "two angles cost less than the eleven unknowns",
-        ALL,
-        _ANGLES_ALONE,
     ),
-    "positions only / floor": _SpeedLimit(
-        "<=",
+    "angles alone / floor": (
         6.0,
         "the rest of two angles is arithmetic on arrays of a block",
-        _ANGLES_ALONE,
-        FLOOR_OF_TIMES,
     ),
-    "solve to forces / formulas": _SpeedLimit(
-        "<=",
+    "solve to forces / formulas": (
         2.0,
         "new arrays and the points come on top, no second evaluation",
-        TO_FORCES,
-        ALL,
     ),
-    "solve with error bars / to forces": _SpeedLimit(
-        "<=",
+    "solve with error bars / solve to forces": (
         10.0,
         "the same formulas once more, in longer numbers, which the processor takes one"
         " by one",
-        WITH_ERROR_BARS,
-        TO_FORCES,
     ),
-    "one position / its 13x13": _SpeedLimit(
-        "<=",
+    "one position / 13x13 of one position": (
         1.2,
         "some hundred steps of Python, as the engine takes",
-        ONE_POSITION,
-        "13x13 of one position",
     ),
-    "one position with error bars / to forces": _SpeedLimit(
-        "<=",
+    "one position with error bars / one position": (
         4.5,
         "the same formulas once more, in numbers of NumPy's own",
-        "one position with error bars",
-        ONE_POSITION,
     ),
-    "study of linkages / positions": _SpeedLimit(
-        "<=",
+    "study of linkages / positions": (
         2.0,
         "a member is a column of the same arrays as a position",
     ),
-    "growth from 1000 positions on": _SpeedLimit(
-        "<=",
+    "growth from 1000 positions on": (
         1.3,
         "the work is linear in the positions: blocks fit the cache",
     ),
-    "memory beyond the result, MB": _SpeedLimit(
-        "<=",
+    "memory beyond the result, MB": (
         50.0,
         "work space is that of a block, not of the sweep",
     ),
-    _JUDGED_BY_POSITION: _SpeedLimit(
-        "<=",
+    "a judged scene / one position": (
         170.0,
         "17 ms where a position takes 0.1 ms: a million scenes a night on one core",
     ),
-    "import fourbar / import numpy": _SpeedLimit(
-        "<=",
+    "import fourbar / import numpy": (
         1.0,
         "it loads numpy alone, and less than that of its own",
     ),
-    **{
-        f"{command} / import numpy": _SpeedLimit(
-            "<=",
-            3.0,
-            "a command loads what it uses alone",
-        )
-        for command in (
-            "fourbar --help",
-            "fourbar-validation --help",
-            "analyze",
-            "check",
-        )
-    },
+    **dict.fromkeys(
+        (
+            "fourbar --help / import numpy",
+            "fourbar-validation --help / import numpy",
+            "analyze / import numpy",
+            "check / import numpy",
+        ),
+        (3.0, "a command loads what it uses alone"),
+    ),
 }
-"""Limits by the name of the row."""
+"""The most that a row of the table may be, by its name, and the reason.
+
+Most are ratios of the times of two rows, which are the same with and without AVX-512.
+"""
 
 
 class Measured(NamedTuple):
@@ -273,11 +215,8 @@ def bench(
 
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
         # read when numpy is loaded: too late in this process
-        arguments = ["--positions", positions, "--largest", largest]
-        arguments += ["--picture", picture] if picture is not None else []
-        line = [sys.executable, "-m", "fourbar_lab", "bench", *map(str, arguments)]
         status = subprocess.run(
-            line,
+            [sys.executable, "-m", "fourbar_lab", *sys.argv[1:]],
             env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
             check=False,
         ).returncode
@@ -286,22 +225,19 @@ def bench(
     rows: list[tuple[str, ...]] = []
     broken: list[str] = []
     for what, measured in measurement.rows.items():
-        if what == JUDGED_SCENE:
-            rows.append((what, f"{1e-6 * measured:.1f} ms"))
-        elif what not in SPEED_LIMITS:
-            rows.append((what, f"{measured:.1f} ns/position"))
-        else:
-            limit = SPEED_LIMITS[what]
-            needed = f"{limit.sign} {limit.bound:g}"
-            verdict = "holds"
-            if not limit.holds(measured):
-                verdict = "fails"
-                broken.append(f"{what}: {limit.reason}")
-            rows.append((what, f"{measured:.2f}", needed, verdict))
+        if what not in SPEED_LIMITS:
+            rows.append((what, f"{measured:.1f} ns"))
+            continue
+        most, reason = SPEED_LIMITS[what]
+        verdict = "holds"
+        if not measured <= most:  # NaN does not hold
+            verdict = "fails"
+            broken.append(f"{what}: {reason}")
+        rows.append((what, f"{measured:.3g}", f"<= {most:g}", verdict))
     console = Console()
     title = (
-        f"{positions} positions, one core, medians of {ROUNDS} interleaved rounds;"
-        f" {name_machine()}"
+        f"{positions} positions, times of one on one core, medians of {ROUNDS}"
+        f" interleaved rounds; {name_machine()}"
     )
     console.print(
         make_words_table(("what", "measured", "needed", ""), rows, title=title)
@@ -347,14 +283,17 @@ def measure_speed(
 
     single = repeated(solve, alone)
     actions: dict[str, tuple[int, Callable[[], object]]] = {
-        ALL: (positions, partial(solve, scene, at=command, out=everything)),
-        _ANGLES_ALONE: (positions, partial(solve, scene, at=command, out=angles)),
-        _SYSTEM: (batch, _prepare_thirteen(batch)),
-        FLOOR_OF_TIMES: (positions, _make_floor(command.theta_2, angles)),
-        TO_FORCES: (many, partial(solve, scene, "force", at=solved)),
-        WITH_ERROR_BARS: (many, partial(solve, scene, "error", at=solved)),
+        "formulas": (positions, partial(solve, scene, at=command, out=everything)),
+        "angles alone": (positions, partial(solve, scene, at=command, out=angles)),
+        "13x13": (batch, _prepare_thirteen(batch)),
+        "floor": (
+            positions,
+            _make_floor(command.theta_2, angles),
+        ),
+        "solve to forces": (many, partial(solve, scene, "force", at=solved)),
+        "solve with error bars": (many, partial(solve, scene, "error", at=solved)),
         "13x13 of one position": (SINGLE_CALLS, repeated(_prepare_thirteen(1))),
-        ONE_POSITION: (SINGLE_CALLS, single),
+        "one position": (SINGLE_CALLS, single),
         "one position with error bars": (SINGLE_CALLS, repeated(solve, alone, "error")),
     }
     if "C" in loops:
@@ -372,13 +311,12 @@ def measure_speed(
     if not any(engine.missing() for engine in exact):
         scenes = max(1, positions // _PER_SCENE)
         seconds, ratio = _time_judging(exact, scenes, single)
-        rows[JUDGED_SCENE] = 1e9 * seconds
-        rows[_JUDGED_BY_POSITION] = ratio
-    rows |= {
-        name: rows[row.of] / rows[row.over]
-        for name, row in SPEED_LIMITS.items()
-        if {row.of, row.over} <= rows.keys()
-    }
+        rows["a scene judged by the exact engines"] = 1e9 * seconds
+        rows["a judged scene / one position"] = ratio
+    for name in SPEED_LIMITS:
+        of, _, over = name.partition(" / ")
+        if {of, over} <= rows.keys():
+            rows[name] = rows[of] / rows[over]
     rows |= {
         "study of linkages / positions": (
             by_linkages[STUDY][most] / by_linkages[ONE_LINKAGE][most]
