@@ -18,15 +18,12 @@ import numpy as np
 from fourbar.errors import FourBarError
 from fourbar.files import dump, loads, save
 from fourbar.scene import Scene
-from fourbar_lab import LAB_FOLDER
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import workers as worker_processes
 from fourbar_validation.engines.registry import ENGINES, hold_fully
 from fourbar_validation.places import CHECKOUT
-from fourbar_validation.report.machine import name_code
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.store import Store
 
 ORDINARY = "random"
 """Family of the scenes with even numbers."""
@@ -52,7 +49,7 @@ EXACT_ENGINES = tuple(
 the position.
 """
 SCENES_OF_A_TASK = 200
-"""Scenes per task: some seconds, which is what an interruption costs."""
+"""Scenes per task: some seconds."""
 UNTOLD = ("undecided", "status", "exchanged")
 """Checks that are no finding where they fail: half of the scenes are drawn where
 doubles have few digits, and one in three thousand, read from its other end, loses more
@@ -169,36 +166,21 @@ def _find_lost(
 
 
 def examine_scenes(
-    count: int,
-    seed: int,
-    out: Path,
-    workers: int,
-) -> Iterator[dict[str, list[str]]]:
-    """Examine the scenes task by task, what is wrong by number.
-
-    Tasks of an interrupted run are read.
-    """
-    with Store(out, {"seed": seed, **name_code(LAB_FOLDER)}).held() as store:
-        done = store.done()
-        todo = []
-        for start in range(0, count, SCENES_OF_A_TASK):
-            stop = min(start + SCENES_OF_A_TASK, count)
-            if stop in done:
-                yield store.read(stop)[0]
-            else:
-                todo.append((stop, range(start, stop)))
-        for stop, outcomes in worker_processes.apply_over_processes(
-            partial(examine_scene, seed),
-            todo,
-            workers,
-            seconds=worker_processes.SCENE_SECONDS,
-            instead=_find_lost,
-        ):
-            first = stop - len(outcomes)
-            numbered = enumerate(outcomes, first)
-            wrong = {str(number): found for number, found in numbered if found}
-            store.put(stop, [wrong])
-            yield wrong
+    count: int, seed: int, workers: int
+) -> Iterator[dict[int, list[str]]]:
+    """Examine the scenes task by task, what is wrong by number."""
+    starts = range(0, count, SCENES_OF_A_TASK)
+    numbers = range(count)
+    tasks = [(start, numbers[start : start + SCENES_OF_A_TASK]) for start in starts]
+    for start, outcomes in worker_processes.apply_over_processes(
+        partial(examine_scene, seed),
+        tasks,
+        workers,
+        seconds=worker_processes.SCENE_SECONDS,
+        instead=_find_lost,
+    ):
+        numbered = enumerate(outcomes, start)
+        yield {number: found for number, found in numbered if found}
 
 
 @click.command()
@@ -217,19 +199,7 @@ def examine_scenes(
     type=click.IntRange(1),
     help="Processes.",
 )
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("results/fuzz"),
-    show_default=True,
-)
-def fuzz(
-    scenes: int,
-    seed: int,
-    workers: int,
-    out: Path,
-) -> int:
+def fuzz(scenes: int, seed: int, workers: int) -> int:
     """Put random scenes through files, formulas and exact engines.
 
     Every failure is shrunk and kept.
@@ -238,14 +208,14 @@ def fuzz(
     from rich.progress import track
 
     console = Console(stderr=True)
-    wrong: dict[str, list[str]] = {}
+    wrong: dict[int, list[str]] = {}
     tasks = -(-scenes // SCENES_OF_A_TASK)
-    running = examine_scenes(scenes, seed, out, workers)
+    running = examine_scenes(scenes, seed, workers)
     for task in track(running, "fuzzing", total=tasks, console=console):
         wrong |= task
-    for number in sorted(wrong, key=int)[:FAILURES_PRINTED]:
+    for number in sorted(wrong)[:FAILURES_PRINTED]:
         source = wrong[number][0]
-        scene = draw_fuzz_scene(seed, int(number))
+        scene = draw_fuzz_scene(seed, number)
         if not source.startswith(WORKER_LOST):  # shrinking would end this process too
             scene = shrink_scene(scene, lambda smaller: bool(list_findings(smaller)))
             source = list_findings(scene)[0]
