@@ -25,7 +25,13 @@ from fourbar.studies.keys import (
     read_numbers,
     replace_numbers,
 )
-from fourbar_lab.tally import Tally, error_over_allowed, is_untold, list_components
+from fourbar_lab.tally import (
+    SAMPLES,
+    Tally,
+    error_over_allowed,
+    is_untold,
+    list_components,
+)
 from fourbar_validation.engines.balls import (
     STEP_BITS,
     BallValues,
@@ -113,17 +119,17 @@ def judge_slopes(
     sample: str,
 ) -> None:
     """Compare the derivatives at one position with those of the reference."""
-    tally.samples += 1
+    tally.counts[SAMPLES] += 1
     values, exact = _compute_exact_slopes(scene)
     slopes = differentiate(scene)
     numbers = list_numbers_by_key(scene)
     if not values:
-        tally.not_assembled += 1
+        tally.counts["not assembled"] += 1
         if np.nan_to_num(slopes["F12"]).any():
             tally.worst["assembled"] = (math.inf, sample)
         return
     if not exact or _is_held(scene, values):
-        tally.no_torque += 1
+        tally.counts["no torque"] += 1
         return
     moves = {  # sum |x_i dy/dx_i|
         name: math.fsum(
@@ -134,7 +140,7 @@ def judge_slopes(
     if np.isnan(slopes["sin_mu"]).any() and is_untold(
         values["sin_mu"], moves["sin_mu"]
     ):
-        tally.untold += 1
+        tally.counts["no digit tells"] += 1
         return
     for name, rows in slopes.items():
         together = max(

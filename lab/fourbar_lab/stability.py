@@ -26,6 +26,8 @@ from fourbar_lab.slopes import judge_slopes
 from fourbar_lab.tally import (
     BAR_FACTORS,
     HALF_A_DIGIT,
+    SAMPLES,
+    TOO_LARGE,
     Tally,
     error_over_allowed,
     list_components,
@@ -89,7 +91,7 @@ def judge_sample(
     sample: str,
 ) -> None:
     """Compare one position with the reference."""
-    tally.samples += 1
+    tally.counts[SAMPLES] += 1
     angle = float(np.asarray(scene.motion.angle))
     drive = name_driving(scene)
     # a component of a pin force that such a drive has no part in is left of larger ones
@@ -105,7 +107,7 @@ def judge_sample(
     sign = int(with_signs(scene.linkage, command(scene)).branch[0])
     exact = compute_reference(scene, sign, angle)
     if exact is None:
-        tally.not_assembled += 1
+        tally.counts["not assembled"] += 1
         if math.isfinite(solution[drive]):
             tally.worst["assembled"] = (math.inf, sample)
         return
@@ -124,7 +126,7 @@ def judge_sample(
             )
             tally.note(component, part, sample)
     if drive not in values:
-        tally.no_torque += 1
+        tally.counts["no torque"] += 1
         return
     force = max(
         math.hypot(errors[f"{name}_x"], errors[f"{name}_y"]) for name in PIN_FORCES
@@ -135,9 +137,9 @@ def judge_sample(
         ("force_error", force, strongest),
     ):
         bar = float(solution[name])
-        ratio = float(find_used(error, bar))
-        tally.too_small[name] = max(tally.too_small.get(name, 0.0), ratio)
-        tally.too_large[name] += bar > BAR_FACTORS * max(error, HALF_A_DIGIT * size)
+        tally.note(name, float(find_used(error, bar)), sample)
+        useless = bar > BAR_FACTORS * max(error, HALF_A_DIGIT * size)
+        tally.counts[f"{name}{TOO_LARGE}"] += useless
 
 
 def judge_samples(
@@ -197,28 +199,18 @@ def _judge_task(
     return judge_samples(*task, seed, bar, derivatives=derivatives)
 
 
-def list_rows(tallies: Collection[Tally], derivatives: bool) -> list[list[str]]:
+def list_rows(tallies: Collection[Tally]) -> list[list[str]]:
     """List the rows of the table: a name, and a cell of each tally."""
     rows = []
     for name in dict.fromkeys(chain.from_iterable(tally.worst for tally in tallies)):
         row = [name]
         for tally in tallies:
             ratio, _ = tally.worst.get(name, (math.nan, ""))
-            cell = f"{ratio:.3f}" + " fails" * (ratio > 1.0)
+            cell = f"{ratio:.3f}" + " fails" * (name in tally.list_beyond())
             row.append("-" if math.isnan(ratio) else cell)
         rows.append(row)
-    for bar in ("torque_error", "drive_force_error", "force_error"):
-        if any(bar in tally.too_small for tally in tallies):
-            small = [tally.too_small.get(bar, math.nan) for tally in tallies]
-            large = [100.0 * tally.too_large[bar] / tally.samples for tally in tallies]
-            rows.append([f"error / {bar}", *(f"{x:.2f}" for x in small)])
-            title = f"% {bar} > {BAR_FACTORS:.0f} x error"
-            rows.append([title, *(f"{x:.2f}" for x in large)])
-    counts = {"not assembled": "not_assembled", "no torque": "no_torque"}
-    if derivatives:
-        counts["no digit tells"] = "untold"
-    for title, name in counts.items():
-        rows.append([title, *(str(getattr(tally, name)) for tally in tallies)])
+    for name in dict.fromkeys(chain.from_iterable(tally.counts for tally in tallies)):
+        rows.append([name, *(str(tally.counts[name]) for tally in tallies)])
     return rows
 
 
@@ -277,21 +269,21 @@ def stability(
     judged = zip(tasks, results, strict=True)
     for (family, _), tally in track(judged, "samples", total=len(tasks)):
         tallies[family].add(tally)
-    rows = list_rows(tallies.values(), derivatives)
+    rows = list_rows(tallies.values())
     console = Console()
     if not console.is_terminal:
         # in a file the columns of all families keep their width
         console.width = WIDE
     of = ", of derivatives by every number" if derivatives else ""
     title = (
-        f"largest error / (8 eps (|y| + sum |x dy/dx|)), {samples} samples each, seed"
-        f" {seed}{of}"
+        f"largest error / (8 eps (|y| + sum |x dy/dx|)), of error bars error / bar,"
+        f" {samples} samples each, seed {seed}{of}"
     )
     console.print(make_words_table(("output", *chosen), rows, title=title))
     for family, tally in tallies.items():
-        for name, (part, sample) in tally.worst.items():
-            if part > 1.0:
-                console.print(f"{name}: {part:.3g} at sample {sample}")
+        for name in tally.list_beyond():
+            part, sample = tally.worst[name]
+            console.print(f"{name}: {part:.3g} at sample {sample}")
         for line in tally.warned[:5]:
             console.print(f"{family} warned: {line}")
     for family, tally in tallies.items():

@@ -20,6 +20,9 @@ TOO_SMALL, BAR_FACTORS = 10.0, 100.0
 larger (in one of USELESS samples).
 """
 USELESS = 0.01
+SAMPLES = "samples"
+TOO_LARGE = f" > {BAR_FACTORS:.0f} x error"
+"""Name of what is counted of all samples, and end of the name of it of a bar."""
 CHANCE = 1e-6
 """Least probability of so many samples or more by chance. The share is that of USELESS.
 One of 60 samples is.
@@ -38,32 +41,22 @@ closes.
 class Tally:
     """Results of a number of samples of one family."""
 
-    samples: int = 0
-    not_assembled: int = 0
-    no_torque: int = 0
-    """Samples in which the exact system of forces is singular: nothing to compare."""
-    untold: int = 0
-    """Samples without derivatives, where doubles do not tell that the loop closes."""
+    counts: Counter[str] = field(default_factory=Counter)
+    """SAMPLES, and of these the ones in which something was not compared, or an error
+    bar is more than BAR_FACTORS times the error.
+    """
     worst: dict[str, tuple[float, str]] = field(default_factory=dict)
-    """Output: largest error/allowed, and the sample it belongs to."""
-    too_small: dict[str, float] = field(default_factory=dict)
-    """Error bar: largest error/bar."""
-    too_large: Counter[str] = field(default_factory=Counter)
-    """Error bar: samples in which it is more than BAR_FACTORS times the error."""
+    """Output: largest error/allowed, and the sample it belongs to; of an error bar the
+    largest error/bar.
+    """
     warned: list[str] = field(default_factory=list)
 
     def add(self, other: "Tally") -> None:
         """Take in the samples of another tally."""
-        self.samples += other.samples
-        self.not_assembled += other.not_assembled
-        self.no_torque += other.no_torque
-        self.untold += other.untold
+        self.counts.update(other.counts)
         self.warned += other.warned
         for name, entry in other.worst.items():
             self.note(name, *entry)
-        for name, ratio in other.too_small.items():
-            self.too_small[name] = max(self.too_small.get(name, 0.0), ratio)
-        self.too_large.update(other.too_large)
 
     def note(
         self,
@@ -74,15 +67,31 @@ class Tally:
         """Keep the largest error over what is allowed."""
         self.worst[output] = max(self.worst.get(output, (0.0, "")), (ratio, sample))
 
+    def list_beyond(self) -> list[str]:
+        """List the outputs and error bars that are beyond what is allowed."""
+        return [
+            name
+            for name, (ratio, _) in self.worst.items()
+            if not ratio <= find_most(name)
+        ]
+
     def holds(self) -> bool:
         """Return whether error and error bars are as promised.
 
         Something must have been compared.
         """
-        within = all(ratio <= 1.0 for ratio, _ in self.worst.values())
-        bars = all(ratio <= TOO_SMALL for ratio in self.too_small.values())
-        useful = all(is_by_chance(n, self.samples) for n in self.too_large.values())
-        return bool(self.worst) and within and bars and useful and not self.warned
+        samples = self.counts[SAMPLES]
+        useful = all(
+            is_by_chance(count, samples)
+            for name, count in self.counts.items()
+            if name.endswith(TOO_LARGE)
+        )
+        return bool(self.worst) and useful and not (self.list_beyond() or self.warned)
+
+
+def find_most(name: str) -> float:
+    """Return how many times what is allowed an output's error, or a bar's, may be."""
+    return TOO_SMALL if name.endswith("_error") else 1.0
 
 
 def is_by_chance(count: int, samples: int) -> bool:

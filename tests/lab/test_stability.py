@@ -11,7 +11,7 @@ from pytest import fixture, mark
 import fourbar
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.stability import judge_samples
-from fourbar_lab.tally import CHANCE, TOO_SMALL, USELESS, is_by_chance
+from fourbar_lab.tally import CHANCE, TOO_LARGE, TOO_SMALL, USELESS, is_by_chance
 
 pytestmark = mark.slow  # random campaigns
 SAMPLES = 10
@@ -83,10 +83,7 @@ theta_2 - theta_1 had lost nothing.
 def assert_bounds(tally):
     """Assert that outputs are within what the inputs' last digits do, bars too."""
     assert not tally.warned
-    assert not {
-        name: entry for name, entry in tally.worst.items() if not entry[0] <= 1.0
-    }
-    assert all(ratio <= TOO_SMALL for ratio in tally.too_small.values())
+    assert not [(name, tally.worst[name]) for name in tally.list_beyond()]
 
 
 @fixture(scope="module")
@@ -97,7 +94,8 @@ def tallies():
 @mark.parametrize("family", FAMILY_DRAWERS)
 def test_every_output_is_within_what_the_inputs_last_digits_do(family, tallies):
     tally = tallies[family]
-    assert tally.samples == SAMPLES and tally.not_assembled <= SAMPLES / 10
+    counts = tally.counts
+    assert counts["samples"] == SAMPLES and counts["not assembled"] <= SAMPLES / 10
     assert_bounds(tally)
 
 
@@ -107,7 +105,8 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
     family, bar
 ):
     tally = judge_samples(family, range(FED_BACK), bar=bar)
-    assert tally.samples > FED_BACK / 2 and not tally.not_assembled
+    counts = tally.counts
+    assert counts["samples"] > FED_BACK / 2 and not counts["not assembled"]
     assert_bounds(tally)
     assert {"theta_2", "omega_2", "alpha_2"} <= tally.worst.keys()
 
@@ -119,7 +118,7 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
 )
 def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(family, samples):
     tally = judge_samples(family, samples, derivatives=True)
-    assert tally.holds() and not tally.untold
+    assert tally.holds() and not tally.counts["no digit tells"]
     assert {"torque", "F12_x", "theta_4", "a_B_y"} <= tally.worst.keys()
 
 
@@ -129,14 +128,11 @@ def test_error_bars_are_neither_too_small_nor_useless(tallies):
         ("drive_force_error", 4),
         ("force_error", 13),
     ):
-        judged = [tally for tally in tallies.values() if bar in tally.too_small]
-        assert (
-            len(judged) == families
-            and max(tally.too_small[bar] for tally in judged) <= TOO_SMALL
-        )
-        assert is_by_chance(
-            sum(tally.too_large[bar] for tally in judged), SAMPLES * families
-        )
+        judged = [tally for tally in tallies.values() if bar in tally.worst]
+        assert len(judged) == families
+        assert max(tally.worst[bar][0] for tally in judged) <= TOO_SMALL
+        useless = sum(tally.counts[f"{bar}{TOO_LARGE}"] for tally in judged)
+        assert is_by_chance(useless, SAMPLES * families)
 
 
 def test_a_share_is_one_that_chance_explains():
@@ -162,7 +158,7 @@ def test_samples_that_once_were_bad(family, seed, number):
 @mark.parametrize("number", ONCE_TOO_WIDE)
 def test_bars_that_stay_parallel_are_charged_what_the_subtraction_lost_alone(number):
     tally = judge_samples("change_point", range(number, number + 1))
-    assert not any(tally.too_large.values())
+    assert not tally.counts[f"force_error{TOO_LARGE}"]
     assert_bounds(tally)
 
 
