@@ -28,6 +28,7 @@ from fourbar.scene import Scene
 from fourbar.scene.motion import Motion
 from fourbar.scene.numbers import Point
 from fourbar.solving import solve
+from fourbar.studies.keys import list_entries, read_number, replace_numbers
 from fourbar_validation.scenes.random import (
     DrawAngle,
     DrawnLinkage,
@@ -157,31 +158,20 @@ def _draw_with_ratios(rng: Generator) -> DrawnLinkage:
 ANYWHERE = RandomFamily(_draw_anywhere, _EVEN)
 
 
+_GROWS = {"m": 1, "N m": 1, "kg m^2": 2}
+"""Powers of the factor on lengths by which numbers of bars and loads grow, by unit."""
+
+
 def scales(rng: Generator) -> Scene:
     """Multiply all lengths by 1e-9..1e9."""
     scene = ANYWHERE.draw(rng)
-    link = scene.linkage
     k = float(10.0 ** rng.uniform(-9, 9))
-    bars = []
-    for number in MOVING_BARS:
-        bar = link.bar(number)
-        r, phi = bar.mass_centre
-        inertia = bar.moment_of_inertia * k * k
-        bars.append(Bar(bar.length * k, bar.mass, inertia, (r * k, phi)))
-    two, three, four = bars
-    linkage = FourBar(link.ground * k, two, three, four, link.ground_angle)
-    loads = tuple(_scale_load_with_lengths(load, k) for load in scene.loads)
-    return replace(scene, linkage=linkage, loads=loads)
-
-
-def _scale_load_with_lengths(load: Load, k: float) -> Load:
-    """Return the load of a linkage whose lengths are k times as large."""
-    scaled: Any = {
-        form: (place[0] * k, place[1])
-        for form in ("from_pin", "from_centre", "arm")
-        if (place := getattr(load, form)) is not None
-    }
-    return replace(load, moment=load.moment * k, **scaled)
+    numbers = {}
+    for key, number in list_entries(scene).items():
+        if not key.startswith("effects."):
+            factors = [k] * _GROWS.get(number.unit, 0)
+            numbers[key] = math.prod([read_number(scene, number), *factors])
+    return replace_numbers(scene, numbers)
 
 
 def speeds(rng: Generator) -> Scene:
