@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 from pytest import importorskip, mark, raises
 
 import fourbar
-from fourbar import InputError, Motion, Point, solve
+from fourbar import Motion, Point, solve
 from fourbar.solution import unwrap
+from tests.support.rows import refused
 from tests.support.scenes import crank_rocker
 
 
@@ -26,10 +27,10 @@ def test_a_quantity_is_found_by_its_name():
     assert solution["P"] is solution.points["P"]
     assert solution["v_P"] is solution.velocity["P"]
     for name in ("tork", 0, "F12_x"):
-        with raises(InputError, match="must be among theta_2, "):
+        with refused("must be among theta_2, "):
             solution[name]
     positions = solve(crank_rocker(), "position")
-    with raises(InputError, match="'torque': was not evaluated"):
+    with refused("'torque': was not evaluated"):
         positions["torque"]
     with raises(TypeError, match="not iterable"):
         iter(solution)

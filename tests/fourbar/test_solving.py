@@ -11,14 +11,13 @@ from math import isfinite, pi
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pytest import approx, mark, raises
+from pytest import approx, mark
 
 from fourbar import (
     Bar,
     FourBar,
     Friction,
     Gravity,
-    InputError,
     LinearDrive,
     Load,
     Motion,
@@ -37,6 +36,7 @@ from fourbar import (
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK
 from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
+from tests.support.rows import refused
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     bare,
@@ -239,11 +239,11 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on():
 
 
 def test_lengths_and_sweeps_beyond_the_range_of_doubles_are_refused():
-    with raises(InputError, match="lengths = "):
+    with refused("lengths = "):
         FourBar(1e308, *[Bar(1e308, inertia=0.0)] * 3)
     large = FourBar(4e307, *[Bar(4e307)] * 3)
     assert solved(Scene(large, Motion(1.0, 1e-200))).status == ["ok"]
-    with raises(InputError, match=r"motion\.theta_2\.to = 1e\+308"):
+    with refused("motion.theta_2.to = 1e+308"):
         Motion(Sweep(-1e308, 1e308, 3))
 
 

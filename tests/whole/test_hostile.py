@@ -12,10 +12,10 @@ from unittest.mock import Mock
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from pytest import mark, raises
+from pytest import mark
 
 import fourbar
-from fourbar.errors import BAD_INPUT, FAILED, InputError
+from fourbar.errors import BAD_INPUT, FAILED
 from fourbar.files import save
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf, write_usd
@@ -33,6 +33,7 @@ from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.checkout import read_complaint
 from tests.support.here import judge_here
+from tests.support.rows import refused
 from tests.support.scenes import crank_rocker
 from tests.support.unlucky import Declines, Few
 
@@ -236,9 +237,8 @@ OUTSIDE = ("../a.toml", "/etc/passwd", "../*.toml", "a\0.toml")
     ids=lambda value: str(value)[:15],
 )
 def test_a_bad_suite_file_is_one_line(text, words, tmp_path):
-    with raises(InputError) as caught:
+    with refused(words):
         read_suite(listed(tmp_path, text))
-    assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
 class Greedy(Declines):

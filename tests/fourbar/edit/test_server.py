@@ -19,8 +19,6 @@ from pathlib import Path
 
 from pytest import fixture, importorskip, mark, raises
 
-from fourbar import InputError
-
 importorskip(
     "tornado",
     reason="the workbench is served by tornado: pip install tornado",
@@ -36,7 +34,7 @@ from tornado.websocket import websocket_connect
 from fourbar.edit import exports, server, session
 from fourbar.edit.redirect import REDIRECT_ENDING, REDIRECT_PAGE, Redirect
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
 HUGE = 100_000_000
@@ -461,7 +459,7 @@ def test_a_file_that_another_one_locks_and_gives_no_address_for_is_named(
     monkeypatch.setattr("fourbar.edit.redirect.PATIENCE", 0.1)
     first, second = Redirect(tmp_path / "a.toml"), Redirect(tmp_path / "a.toml")
     assert first.claim() and not second.claim()
-    with raises(InputError, match="has no address"):
+    with refused("has no address"):
         second.read()
     first.remove()
     assert second.claim()
@@ -476,7 +474,7 @@ def test_a_file_of_the_page_s_name_that_is_somebody_else_s_stays_as_it_is(
     page = tmp_path / f"a.toml{REDIRECT_ENDING}"
     page.write_text(content)
     page.chmod(0o644)
-    with raises(InputError, match="is another file: move it away"):
+    with refused("is another file: move it away"):
         Redirect(tmp_path / "a.toml").claim()
     assert (page.read_text(), page.stat().st_mode & 0o777) == (content, 0o644)
 

@@ -30,7 +30,7 @@ from fourbar.files.scene_file import loads
 from fourbar.quantities import PIN_FORCES
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, PARALLELOGRAM, crank_rocker
 from tests.support.texts import LINE_DRIVEN
 
@@ -140,7 +140,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
         match="a drive is a couple on a bar or a force",
     ):
         replace(scene, drive_bar=3)
-    with raises(InputError, match="out = 'torque'"):
+    with refused("out = 'torque'"):
         solve(scene, out={"torque": np.empty(1)})
     with raises(
         InputError,

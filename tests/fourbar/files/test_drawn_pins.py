@@ -19,7 +19,7 @@ from fourbar import (
 from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
-from tests.support.rows import read_rows, slow_but
+from tests.support.rows import read_rows, refused, slow_but
 
 EPS = 2.0**-52
 K = 8.0
@@ -136,7 +136,7 @@ PLACE ["120 mm", "80 mm"] CLOSED
         (short.replace("bar = 3, ", ""), "points.P.bar: is missing"),
         (short.replace("bar = 3, ", 'bar = 3, from_pin = ["1 m", "0"], '), "already"),
     ):
-        with raises(InputError, match=said):
+        with refused(said):
             loads(DRAWN + text)
 
 
@@ -252,7 +252,7 @@ A = ["0 mm", "100 mm"]\n |  | pins.A: is missing
 )
 def test_a_drawing_that_is_none_is_refused(old, new, says):
     old, new = (text.replace(r"\n", "\n") for text in (old, new))
-    with raises(InputError, match=says):
+    with refused(says):
         loads(DRAWN.replace(old, new))
 
 
@@ -307,12 +307,12 @@ x = "-120 mm" | z = "1 mm", x = "-120 mm" | unknown key
 )
 def test_a_ground_by_coordinates_that_is_none_is_refused(old, new, says):
     new = new.replace(r"\n", "\n")
-    with raises(InputError, match=says):
+    with refused(says):
         loads(CRANE.replace(old, new))
 
 
 def test_a_drawing_on_a_change_point_is_refused():
-    with raises(InputError, match="lie in one line: at a change point"):
+    with refused("lie in one line: at a change point"):
         loads(write_pins((0, 1, 4, 3)))
 
 
@@ -385,7 +385,7 @@ def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
     folded = {2: (0, 300, 300 + 200j, 300), 4: (0, 150 + 80j, 0, 300)}[bar]
     motion = f'[motion]\ntheta_{bar} = "drawn"\nomega_{bar} = "1 rad/s"\n'
     text = write_pins(folded) + motion
-    with raises(InputError, match="stands still: command another bar"):
+    with refused("stands still: command another bar"):
         loads(text)
     other = 6 - bar
     scene = loads(text.replace(f"_{bar} =", f"_{other} ="))

@@ -18,7 +18,6 @@ from fourbar import (
     Free,
     FromLimit,
     Gravity,
-    InputError,
     Motion,
     Place,
     Spring,
@@ -123,9 +122,9 @@ def test_save_is_whole_or_not_at_all(tmp_path, monkeypatch):
 
 def test_what_a_file_cannot_hold_is_refused():
     scene = load(FILES[0])
-    with raises(InputError, match="one effect of each kind"):
+    with refused("one effect of each kind"):
         dump(replace(scene, effects=(Gravity(), Gravity())))
-    with raises(InputError, match="Unicode"):
+    with refused("Unicode"):
         dump(replace(scene, title="\ud800"))
 
 
@@ -151,17 +150,17 @@ def test_three_sigma_less_than_the_number_are_written_and_more_are_not():
         for width in (0.033, 0.034)
     )
     assert loads(dump(less)) == less
-    with raises(InputError, match="three sigma of it must be less"):
+    with refused("three sigma of it must be less"):
         dump(more)
 
 
 def test_a_stroke_is_less_than_the_spring_is_long():
     ends = Place(1, (0.03, -1.0)), Place(3, (0.02, 0.3))
     for stroke, words in (
-        (0.3, r"stroke = 0\.3 m: must be less than the"),
-        (-0.1, r"stroke = -0\.1: must be a finite number > 0"),
+        (0.3, "stroke = 0.3 m: must be less than the"),
+        (-0.1, "stroke = -0.1: must be a finite number > 0"),
     ):
-        with raises(InputError, match=words):
+        with refused(words):
             Spring(*ends, 10.0, 0.3, stroke=stroke)
 
 

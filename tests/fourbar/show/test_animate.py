@@ -22,7 +22,6 @@ from pytest import approx, mark, raises
 from fourbar import (
     DependencyError,
     Free,
-    InputError,
     Law,
     Motion,
     NotAssembledError,
@@ -35,7 +34,7 @@ from fourbar.show import animate
 from fourbar.show.plot import film as films
 from fourbar.show.plot import style, view
 from fourbar_validation.places import MODELS
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import PARALLELOGRAM, bare, crank_rocker, thesis
 
 HOSTILE = (
@@ -178,7 +177,7 @@ def test_nothing_is_fetched_and_hostile_text_stays_text():
 def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
     path = tmp_path / "picture.png"
     path.write_bytes(content)
-    with raises(InputError, match=message):
+    with refused(message):
         animate.write_animation(
             crank_rocker(), tmp_path / "page.html", pictures={bar: path}
         )
@@ -188,13 +187,13 @@ def test_what_is_no_picture_is_refused(tmp_path, bar, content, message):
 @mark.parametrize(
     "name, options, words",
     [
-        ("a.avi", {}, r"\.html, \.gif, \.mp4"),
+        ("a.avi", {}, ".html, .gif, .mp4"),
         ("a.gif", {"seconds": nan}, "seconds"),
         ("a.gif", {"pictures": {"input": "x.png"}}, "html page"),
     ],
 )
 def test_what_cannot_be_shown_is_refused(name, options, words, tmp_path):
-    with raises(InputError, match=words):
+    with refused(words):
         animate.write_animation(crank_rocker(), tmp_path / name, **options)
     apart = thesis(Sweep(radians(40), radians(50), 5))
     with raises(NotAssembledError, match="assembl"):

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
-from pytest import mark, raises
+from pytest import mark
 
 from fourbar import (
     Bar,
@@ -16,7 +16,6 @@ from fourbar import (
     Free,
     FromLimit,
     Gravity,
-    InputError,
     Motion,
     PinFriction,
     Scene,
@@ -236,19 +235,19 @@ def test_texts_with_units_are_the_numbers():
     assert (from_texts.at.angle == angles).all()
     assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)
     for key, text, words in read_rows("""
-lengths.input | 1 deg | lengths.input = .*"deg" does not convert to m
+lengths.input | 1 deg | "deg" does not convert to m
 effects.viscous.O2 | 1 N m | does not convert to N m s/rad
-lengths.x | 1 mm | (unknown key|is no number)
+lengths.x | 1 mm | lengths.x =
 """):
-        with raises(InputError, match=words):
+        with refused(key, words):
             Tolerance(key, text)
-        with raises(InputError, match=words):
+        with refused(key, words):
             vary(case, {key: [text]})
 
 
 def test_a_study_is_given_no_other_positions():
     study = vary(scene(), {"bars.coupler.mass": [1.0, 2.0]})
-    with raises(InputError, match="states its own positions"):
+    with refused("states its own positions"):
         solve(study, at=command(scene()))
 
 

@@ -16,7 +16,7 @@ from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import CYLINDER, crank_rocker, meet_circles, recommand
 
 SAME_PLACE = 1e-9
@@ -169,12 +169,10 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
 def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
     scene = commanding(2, 0.0, 360.0)
     theta_4 = np.radians([120.0, 140.0])
-    with raises(InputError) as caught:
+    first, _ = np.degrees(find_crank(scene, theta_4, -1.0)) % 360.0
+    words = "line 2, theta_4", "120 deg", f"{first:.6g}", "add a column theta_2"
+    with refused(*words):
         judged(scene, "theta_4", theta_4, theta_4, "{:.0f}")
-    error = str(caught.value)
-    first = np.degrees(find_crank(scene, theta_4[:1], -1.0)) % 360.0
-    assert f"{first[0]:.6g}" in error and "add a column theta_2" in error
-    assert "line 2, theta_4" in error and "120 deg" in error
 
 
 def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
@@ -253,8 +251,8 @@ def follow_rise(time):
     return theta, omega, alpha, solve(SERVO, at=at).torque
 
 
-@mark.parametrize("names, refused", LOGGED)
-def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read):
+@mark.parametrize("names, said", LOGGED)
+def test_rows_along_a_law_have_its_rates_at_their_own_times(names, said, read):
     time = np.arange(0.0123, 0.79, 0.0517)
     theta, omega, alpha, torque = follow_rise(time)
     numbers = {
@@ -272,8 +270,8 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, refused, read
         columns.append([format(x, form) for x in numbers[of] * float(factor)])
     rows = [",".join(cells) for cells in zip(*columns, strict=True)]
     text = "\n".join([",".join(heads), *rows, ""])
-    if refused:
-        with raises(InputError, match=refused) as caught:
+    if said:
+        with raises(InputError, match=said) as caught:
             Judgement(SERVO, read(text))
         assert "Servo" not in str(caught.value)
         return
@@ -322,17 +320,17 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     own = solve(scene, "position")
     text = tabulate("theta_2", own.theta_2, own.stroke).replace("torque", "stroke")
     assert Judgement(scene, read(text)).status == HOLDS
-    with raises(InputError, match="needs a column stroke"):
+    with refused("needs a column stroke"):
         judged(scene, "theta_2", theta, theta)
 
 
 def test_a_table_without_an_angle_names_the_commanded_one(read):
-    with raises(InputError, match=r"needs a column theta_4 \(say theta_4 \[deg"):
+    with refused("needs a column theta_4 (say theta_4 [deg"):
         read("torque\n1.0\n", "theta_4")
 
 
-@mark.parametrize("decimals, refused", [(1, True), (15, False)])
-def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, refused, read):
+@mark.parametrize("decimals, rounded", [(1, True), (15, False)])
+def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, rounded, read):
     law = fourbar.Sine(1.0, 0.5, 2.0 * math.pi, 1.0, 0.1 * math.pi)  # its peak: 0.2 s
     scene = crank_rocker(motion=Motion(law=law))
     times = np.array([0.05, 0.12, 0.22, 0.31, 0.47])
@@ -341,8 +339,8 @@ def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, refused,
     columns = np.round(times, decimals), theta, fourbar.solve(scene, at=at).torque
     rows = [",".join(map(repr, row)) for row in np.transpose(columns).tolist()]
     table = read("\n".join(["time,theta_2,torque", *rows, ""]))
-    if refused:
-        with raises(InputError, match=r"line 4, time = 0\.2: the law is at"):
+    if rounded:
+        with refused("line 4, time = 0.2: the law is at"):
             Judgement(scene, table)
     else:
         assert Judgement(scene, table).status == HOLDS

@@ -26,7 +26,7 @@ from fourbar_validation.engines.programs import Ended
 from fourbar_validation.regression.record import describe_run
 from fourbar_validation.run.judge import judge
 from tests.support.guests import end_guests
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
@@ -189,14 +189,13 @@ command
 def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     file = tmp_path / "engines.toml"
     file.write_text(text.replace(r"\n", "\n"))
-    with raises(InputError) as error:
+    with refused(str(file), words):
         read_engines([tmp_path])
-    assert words in str(error.value) and str(error.value).startswith(str(file))
 
 
 def test_a_name_that_is_nobody_s_is_refused_with_those_that_are_known():
     """The list of known engines has whole names."""
-    with raises(InputError, match="among Newton: MuJoCo solver, Newton: Kam"):
+    with refused("among Newton: MuJoCo solver, Newton: Kam"):
         choose_engines("newton")
     known = r"must be among pinocchio-inverse, .*mujoco 3\.3\.7"
     with raises(InputError, match=known) as error:

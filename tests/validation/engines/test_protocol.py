@@ -12,7 +12,7 @@ import numpy as np
 from pytest import mark, raises
 
 import fourbar
-from fourbar.errors import FourBarError, InputError
+from fourbar.errors import InputError
 from fourbar.scene import StrokeOrigin
 from fourbar.scene import command as list_positions
 from fourbar_validation.compare.answer import Answer, EngineError
@@ -24,7 +24,7 @@ from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.support.rows import read_rows
+from tests.support.rows import read_rows, refused
 from tests.support.scenes import bare, crank_rocker
 
 
@@ -218,7 +218,7 @@ def test_what_an_answer_leaves_out_has_defaults():
     faster = {"theta_2": [0, 1, 2], "omega_2": 1.01}
     assert read_answer({"answers": {}, "at": faster}).at.speed == 1.01
     half = [[1, 2], [3, "y"], None]
-    with raises(InputError, match="F12, entry 1 = 'y'"):
+    with refused("F12, entry 1 = 'y'"):
         read_answer({"answers": {"F12": half}})
 
 
@@ -285,9 +285,8 @@ answer | {"refusal": 3}
 @mark.parametrize("part, text", WRONG)
 def test_what_is_none_is_refused_in_one_line(part, text):
     data = json.loads(text.replace("MOVING", MOVING).replace("HUGE", "9" * 400))
-    with raises(FourBarError) as raised:
+    with refused():
         READ[part](data)
-    assert str(raised.value) and "\n" not in str(raised.value)
 
 
 @mark.parametrize(
@@ -304,8 +303,7 @@ def test_what_is_none_is_refused_in_one_line(part, text):
 """),
 )
 def test_a_setting_that_is_none_is_refused_in_one_line(text):
-    words = r"^setting = [^\n]*: must be an object with name, and steps_per_turn"
-    with raises(InputError, match=words):
+    with refused("setting = ", ": must be an object with name, and steps_per_turn"):
         protocol.read_setting(json.loads(text))
 
 

@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 from pytest import fixture, mark, raises
 
 import fourbar
-from fourbar.errors import BAD_INPUT, FAILED, HOLDS, InputError
+from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import ResultsWriter
 from fourbar_validation.compare.rows import FAILS, REFUSES
@@ -48,7 +48,7 @@ from fourbar_validation.regression.scenes import describe_changes
 from fourbar_validation.report.junit import list_cases
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.here import judge_here
-from tests.support.rows import read_rows, slow_but
+from tests.support.rows import read_rows, refused, slow_but
 from tests.support.runs import (
     FORMS,
     HERE,
@@ -260,7 +260,7 @@ def test_what_is_empty_unfinished_or_fails_is_not_accepted(
     if "--even-failing" in reason:
         assert call("accept", run, "--even-failing")[0] == HOLDS
     else:
-        with raises(InputError, match=reason):
+        with refused(reason):
             read_run(run)
 
 
@@ -299,10 +299,10 @@ def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     file = tmp_path / "results.parquet"
     assert pq.read_table(file)["error"].null_count == 1
     file.write_bytes(b"no columns")
-    with raises(InputError, match="states 2 rows"):
+    with refused("states 2 rows"):
         read_run(tmp_path)
     (tmp_path / ABOUT).unlink()
-    with raises(InputError, match="is not a table written by"):
+    with refused("is not a table written by"):
         read_run(tmp_path)
 
 
@@ -674,7 +674,7 @@ def test_accepted_runs_are_rows_of_one_table_that_pandas_reads(
     assert all(f">c{night}<" in figure.svg for night in range(3))
     assert collect_history(tmp_path) == []
     (kept / HISTORY).write_bytes(b"no columns")
-    with raises(InputError, match="is damaged, or no table"):
+    with refused("is damaged, or no table"):
         summarise(kept / HISTORY)
 
 
@@ -744,7 +744,7 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     printed = sorted(["a\\x1b", *names[1:]])
     assert [*kept.frame().scene.unique()] == printed == [*kept.about.scenes]
     assert [*kept.times().scene.unique()] == printed
-    with raises(InputError, match="must have a name of its own"):
+    with refused("must have a name of its own"):
         read_scene_files([files[0], files[-1]])
 
 
