@@ -14,10 +14,9 @@ from numbers import Integral
 from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import ELSEWHERE, InputError, expect, name_unit, write_in_units
-from fourbar.quantities import PIN_FORCES
+from fourbar.quantities import PIN_FORCES, Array
 
 Lengths = tuple[float, float, float, float]
 """Of ground, input, coupler and output, m."""
@@ -131,7 +130,7 @@ def require_numbers(
     value: object,
     allowed: str = "must be finite numbers",
     unit: str = "1",
-) -> NDArray[np.float64]:
+) -> Array:
     """Return the value as finite floats, shape () or (n,).
 
     Raises an InputError that says what is allowed. A text with a unit is converted as

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.formulas.mobility import TURN
@@ -27,7 +26,10 @@ from fourbar.quantities import (
     STROKE,
     UNITS,
     Array,
+    Codes,
+    Mask,
     Quantities,
+    Signs,
     find_derived,
 )
 from fourbar.scene import Command, Scene, command
@@ -72,7 +74,7 @@ class Solution(Quantities):
     """Positions that were solved, with what is commanded."""
     stated: Scene
     """Scene that was solved, or that of a study, whose numbers that vary are (m, 1)."""
-    status_code: NDArray[np.uint8]
+    status_code: Codes
     """0 ok: every quantity that was requested is a number. 1 not_assembled: all but
     what is commanded is NaN. 2 singular (velocities are 0/0); of friction that depends
     on the pin forces: 3 jammed (no forces fulfil it: they are NaN; at rest, where it is
@@ -89,7 +91,7 @@ class Solution(Quantities):
     change_point: all bars are in line; positions, speeds and the drive are their limits
     along the assembly, pin forces, which have no bound there, are NaN.
     """
-    branch: NDArray[np.int8]
+    branch: Signs
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
     points: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Positions of the scene's own points by name, (n, 2), m."""
@@ -190,7 +192,7 @@ class Solution(Quantities):
         return self.at.commanded
 
     @property
-    def assembled(self) -> NDArray[np.bool_]:
+    def assembled(self) -> Mask:
         """Mark the positions where the loop closes, (n,)."""
         return np.not_equal(self.status_code, NOT_ASSEMBLED)
 

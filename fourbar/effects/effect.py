@@ -7,7 +7,6 @@ from functools import cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.place import Placed
 from fourbar.errors import InputError, LimitError, expect
@@ -15,7 +14,7 @@ from fourbar.formulas.arithmetic import Number, cross, is_any, polar, select
 from fourbar.formulas.motion import State
 from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Codes, Signs
 
 Joints = tuple[float, float, float]
 """Angles of pins O2, A, O4, rad."""
@@ -438,8 +437,8 @@ class Effect(Placed):
     def status(
         self,
         state: State,
-        branch: NDArray[np.int8] | None,
-    ) -> NDArray[np.uint8] | None:
+        branch: Signs | None,
+    ) -> Codes | None:
         """Return status codes, (n,): other than `OK` where the effect has no value.
 
         None: it has a value everywhere.

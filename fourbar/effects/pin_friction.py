@@ -17,14 +17,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, PinRows, SolvedFriction
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
-from fourbar.quantities import JAMMED, OK, SEVERAL, Array
+from fourbar.quantities import JAMMED, OK, SEVERAL, Array, Codes, Mask
 
 ONE_SOLUTION, NO_SOLUTION, MANY = range(3)
 """Number of solutions of the friction equations."""
@@ -206,7 +205,7 @@ class _Problems(NamedTuple):
         """Return the largest couple k |F| of each, N m, (n,)."""
         return np.asarray(np.max(self.k * np.abs(self.F), axis=-1))
 
-    def are_solved(self, x: Array) -> NDArray[np.bool_]:
+    def are_solved(self, x: Array) -> Mask:
         """Mark the problems whose equations couples fulfil, (n,)."""
         right, _ = self.right_side(x)
         largest = np.maximum(x.max(axis=-1), self.size())
@@ -235,7 +234,7 @@ class _Sliding(NamedTuple):
 
     x: Array
     """(n, p), N m; the only or the least solution, NaN where there is none."""
-    number: NDArray[np.uint8]
+    number: Codes
     """(n,), ONE_SOLUTION, NO_SOLUTION or MANY."""
     slope: Array
     """(n, p, p), slope of k |F + C x| at the solution."""
@@ -282,7 +281,7 @@ def find_least_stretch(slope: Array) -> Array:
     return least
 
 
-def _search(problems: _Problems, starts: Array) -> tuple[Array, NDArray[np.uint8]]:
+def _search(problems: _Problems, starts: Array) -> tuple[Array, Codes]:
     """Find the least solution of each problem, and how many there are.
 
     `starts`: (s, p), over the size of the couples.

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.effects.place import COINCIDENT_POINTS, At, Line, Place
@@ -19,7 +18,7 @@ from fourbar.linkage import (
     FourBar,
     OneOf,
 )
-from fourbar.quantities import NO_DIRECTION, OK
+from fourbar.quantities import NO_DIRECTION, OK, Codes, Signs
 
 GAS = {
     "extended": Declared("m", POSITIVE),
@@ -209,8 +208,8 @@ class Springs(Effect):
     def status(
         self,
         state: State,
-        branch: NDArray[np.int8] | None,
-    ) -> NDArray[np.uint8] | None:
+        branch: Signs | None,
+    ) -> Codes | None:
         """Return NO_DIRECTION where the two points of a spring with slack coincide."""
         codes = None
         for spring in self.springs:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, Joints, PinRows
 from fourbar.errors import LimitError
@@ -15,7 +14,7 @@ from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES_OF_BARS
 from fourbar.formulas.position import reorder_lengths
 from fourbar.linkage import PINS, POSITIVE, Declared, FourBar
-from fourbar.quantities import OK, WOUND, Array
+from fourbar.quantities import OK, WOUND, Array, Codes, Signs
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
 """rad; at half a turn itself rounding would decide in which sense the spring turns."""
@@ -81,8 +80,8 @@ class Torsion(PinRows):
     def status(
         self,
         state: State,
-        branch: NDArray[np.int8] | None,
-    ) -> NDArray[np.uint8] | None:
+        branch: Signs | None,
+    ) -> Codes | None:
         """Return WOUND at half a turn from rest and beyond."""
         if self.turns is None or branch is None:
             return None

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions, SolvedFriction, list_bodies
 from fourbar.formulas.arithmetic import U, angle, is_any, select
@@ -22,7 +21,7 @@ from fourbar.formulas.pin_forces import (
 from fourbar.formulas.position import HalfAngle, Loop, Passing, Position
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames
+from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames, Indices, Signs
 from fourbar.scene import Command, Scene
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ _NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
 
 
-def _condense_branch(branch: NDArray[np.int8]) -> Any:
+def _condense_branch(branch: Signs) -> Any:
     """Return the branch as one number if all positions share it, else as an array.
 
     The formulas are quicker with one number.
@@ -295,7 +294,7 @@ class Case(NamedTuple):
         start = motion.part(int(np.argmax(assembled)))
         return self.begin_at(start._replace(speed=0.0, acceleration=0.0))
 
-    def half_angle(self, at: Command) -> tuple[HalfAngle, NDArray[np.intp]]:
+    def half_angle(self, at: Command) -> tuple[HalfAngle, Indices]:
         """Compute the half angles, and the indices of those in many digits."""
         q = at.angle
         remainder = at.remainder

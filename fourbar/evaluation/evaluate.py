@@ -13,7 +13,6 @@ from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.evaluation.case import Case, Dynamics
@@ -40,6 +39,8 @@ from fourbar.quantities import (
     STAGE_OF,
     STAGES,
     WOUND,
+    Codes,
+    Indices,
 )
 from fourbar.scene import Command
 from fourbar.scene.motion import COMMAND_NAMES
@@ -73,7 +74,7 @@ _WITHOUT_FORCES = (NO_DIRECTION, WOUND, NO_LEVER)
 class Evaluated(NamedTuple):
     """Some positions as they were evaluated."""
 
-    codes: NDArray[np.uint8]
+    codes: Codes
     """Status codes."""
     values: dict[str, Any]
     """Quantities by name, vectors as x + i y."""
@@ -212,7 +213,7 @@ def _list_error_bars(
     command: Command,
     state: State,
     dynamics: Dynamics,
-    refined_rows: NDArray[np.intp],
+    refined_rows: Indices,
 ) -> dict[str, Any]:
     """List the error bars of the drive (N m or N) and of the pin forces (N), (n,).
 

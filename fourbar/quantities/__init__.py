@@ -13,6 +13,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+"""True or False at each position."""
+Indices = NDArray[np.intp]
+"""Indices of positions, or of rows of another array."""
+Signs = NDArray[np.int8]
+"""+1 or -1, of an assembly."""
+Codes = NDArray[np.uint8]
+"""Status codes of positions."""
 
 
 class Quantity(NamedTuple):

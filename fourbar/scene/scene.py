@@ -10,7 +10,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Effect
 from fourbar.effects.place import change_each, settler
@@ -35,7 +34,7 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.path import NO_DIGIT_LEFT, count_turns, prepare_path
 from fourbar.formulas.position import vanish
 from fourbar.linkage import BAR_NAMES, Entries, FourBar, copy_with, require_bar
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices, Signs
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
     COMMAND_NAMES,
@@ -286,7 +285,7 @@ class ReleaseOrigin(NamedTuple):
     alone holds the forces, and dry friction at a standstill has a side of its own.
     """
 
-    bar: NDArray[np.int8]
+    bar: Signs
     """2 or 4, (n,), as all that follows."""
     angle: Array
     """rad."""
@@ -301,7 +300,7 @@ class ReleaseOrigin(NamedTuple):
     +-1: the linkage moves on; otherwise 0.
     """
 
-    def commands(self) -> "Iterator[tuple[NDArray[np.intp], Command, Array]]":
+    def commands(self) -> "Iterator[tuple[Indices, Command, Array]]":
         """List the commands of bars 2 and 4 that the motion is made of.
 
         An entry has the indices of its instants, the command and their side.
@@ -320,7 +319,7 @@ class Command(NamedTuple):
 
     angle: Array
     """(n,), rad."""
-    branch: NDArray[np.int8]
+    branch: Signs
     """Assembly, +1 or -1, (n,), as `Motion` has it."""
     speed: float | Array | None
     """rad/s; None: positions only."""
@@ -722,9 +721,9 @@ def with_signs(linkage: FourBar, at: Command) -> Command:
 def find_signs(
     linkage: FourBar,
     angle: Array,
-    branch: NDArray[np.int8] | int,
+    branch: Signs | int,
     bar: int = 2,
-) -> NDArray[np.int8]:
+) -> Signs:
     """Return the sign of a bar's sine at each of its angles, (n,).
 
     `branch`: of the assembly, one for all or (n,). Given signs, it returns assemblies.

@@ -16,7 +16,6 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects.effect import Actions
 from fourbar.errors import NotAssembledError
@@ -32,7 +31,7 @@ from fourbar.formulas.mobility import (
 from fourbar.formulas.motion import Coefficients, State, rates
 from fourbar.formulas.path import count_turns
 from fourbar.formulas.position import Loop, Position, half_angle, loop
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices, Mask
 from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import Sweep
 from fourbar.solution import Solution
@@ -172,12 +171,12 @@ class CircuitCurve:
         """Change points within the sweep as psi and mu, (k, 2)."""
         self.singular = self.singular[self.inside(self.singular[:, 0])]
 
-    def inside(self, psi: Array) -> NDArray[np.bool_]:
+    def inside(self, psi: Array) -> Mask:
         """Mark where psi lies in the sweep, if one is stated."""
         apart = np.abs(_measure_apart(psi, self.middle, self.period))
         return np.asarray(apart <= 0.5 * self.extent + AT_END_OF_SWEEP)
 
-    def reached(self, tau: Array) -> NDArray[np.bool_]:
+    def reached(self, tau: Array) -> Mask:
         """Mark the places that the sweep passes, all of them without a sweep.
 
         The others have the same theta_2 on the other side of a limit or change point
@@ -195,7 +194,7 @@ class CircuitCurve:
         within = apart <= 0.5 * np.abs(steps) + AT_END_OF_SWEEP
         return np.asarray((within & passes[1:] & passes[:-1]).any(axis=1))
 
-    def _holds(self, theta_2: Array, branch: Any) -> NDArray[np.bool_]:
+    def _holds(self, theta_2: Array, branch: Any) -> Mask:
         """Mark the positions that assemble in this circuit."""
         numbers = find_circuit(self.scene.linkage, theta_2, branch)
         return np.equal(numbers, self.number)
@@ -241,7 +240,7 @@ class CircuitCurve:
         places = np.unique(places)
         return places[self.inside(self.points(places)[:, 0])]
 
-    def order(self, tau: Array) -> NDArray[np.intp]:
+    def order(self, tau: Array) -> Indices:
         """Return the indices of the places in the sweep, in order along the row.
 
         A row that goes round begins where theta_2 is counted from.
@@ -280,7 +279,7 @@ class CircuitCurve:
         fastest = np.max(np.abs(state.k[:3]), axis=0)
         return np.asarray(fastest * actions.size)
 
-    def level(self, points: Array) -> NDArray[np.bool_]:
+    def level(self, points: Array) -> Mask:
         """Mark points where Q is zero within round-off."""
         return np.asarray(
             np.abs(self.generalized_force(points)) <= ROUND_OFF_OF_Q * self.size(points)

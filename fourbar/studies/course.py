@@ -3,10 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import ANGLES, Array
+from fourbar.quantities import ANGLES, Array, Indices, Mask
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import default_places
@@ -23,15 +22,15 @@ there as the root of what is commanded.
 """
 SAME_PLACE = 1e-12
 """Part of a motion within which two of its times are one."""
-Condition = Callable[[Solution], NDArray[np.bool_]]
+Condition = Callable[[Solution], Mask]
 Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
 
 
 def list_stretches(
-    holds: NDArray[np.bool_],
+    holds: Mask,
     places: Array,
-    locate: Callable[[NDArray[np.intp], Array], Array] = lambda rows, ends: ends,
+    locate: Callable[[Indices, Array], Array] = lambda rows, ends: ends,
 ) -> list[Stretch]:
     """List from where and up to where a condition holds.
 
@@ -167,7 +166,7 @@ class MotionCourse:
 
 
 def bisect(
-    holds: Callable[[Array], NDArray[np.bool_]],
+    holds: Callable[[Array], Mask],
     low: Array,
     high: Array,
 ) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Springs
 from fourbar.effects.effect import Actions
@@ -35,6 +34,8 @@ from fourbar.quantities import (
     STAGES,
     STATUS_NAMES,
     Array,
+    Indices,
+    Mask,
 )
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
@@ -397,9 +398,9 @@ def _derive(
     scene: Scene,
     keys: dict[str, SceneNumber],
     stated: Command,
-    index: NDArray[np.intp],
+    index: Indices,
     by: dict[str, Array],
-) -> dict[str, NDArray[np.bool_]]:
+) -> dict[str, Mask]:
     """Compute the slopes of quantities at some positions into arrays, by name.
 
     The result marks, by status, the positions where forces have no slopes.

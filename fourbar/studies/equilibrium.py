@@ -20,7 +20,6 @@ from itertools import chain
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import expect
 from fourbar.formulas.mobility import TURN
@@ -34,6 +33,9 @@ from fourbar.quantities import (
     SINGULAR,
     WOUND,
     Array,
+    Indices,
+    Mask,
+    Signs,
 )
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
@@ -130,7 +132,7 @@ class Equilibria(NamedTuple):
     """The scene's positions at rest. `torque` holds them; with friction anything from
     `torque_low` to `torque_high` does.
     """
-    moves: NDArray[np.int8]
+    moves: Signs
     """Sign of the change of theta_2 when each position is released. 0: it stays, has no
     speeds, or has two ways to move.
     """
@@ -189,7 +191,7 @@ def _search(curve: CircuitCurve) -> tuple[Iterable[Any], ...]:
     )
 
 
-def _mark_wound(curve: CircuitCurve, tau: Array) -> NDArray[np.bool_]:
+def _mark_wound(curve: CircuitCurve, tau: Array) -> Mask:
     """Mark places at which a torsion spring is wound beyond half a turn from its rest.
 
     Not marked is what lies beyond a limit or a change point from the first position.
@@ -205,7 +207,7 @@ def _mark_wound(curve: CircuitCurve, tau: Array) -> NDArray[np.bool_]:
     return wound
 
 
-def _is_wound(curve: CircuitCurve, theta_2: Array) -> NDArray[np.bool_]:
+def _is_wound(curve: CircuitCurve, theta_2: Array) -> Mask:
     """Mark angles at which a torsion spring is wound.
 
     The spring is followed from the scene's first position that assembles.
@@ -311,11 +313,11 @@ class _Grid(NamedTuple):
     """Generalised force at each place."""
     size: Array
     """Sum of its absolute terms there or at a neighbour, whichever is larger."""
-    idle: NDArray[np.bool_]
+    idle: Mask
     """True where Q is nothing."""
     gap: Array
     """Distance to the next place along the row, rad."""
-    near: NDArray[np.bool_]
+    near: Mask
     """True where no gap of the sweep lies between."""
 
     @classmethod
@@ -336,7 +338,7 @@ class _Grid(NamedTuple):
     def locate(
         self,
         compute: Callable[[Array], Array],
-        among: NDArray[np.bool_] | bool = True,
+        among: Mask | bool = True,
     ) -> tuple[Array, Array, Array]:
         """Locate where a function of points changes its sign between neighbours.
 
@@ -351,7 +353,7 @@ class _Grid(NamedTuple):
         low = self.places[chosen]
         sides = values[chosen]
 
-        def has_sign_of_start(tau: Array) -> NDArray[np.bool_]:
+        def has_sign_of_start(tau: Array) -> Mask:
             return np.asarray(compute(self.curve.points(tau)) * sides > 0.0)
 
         _, after = bisect(has_sign_of_start, low, low + self.gap[chosen])
@@ -417,12 +419,12 @@ def _add_friction(curve: CircuitCurve, points: Array, impending: int) -> Array:
     return force
 
 
-def _holds(curve: CircuitCurve, points: Array) -> NDArray[np.bool_]:
+def _holds(curve: CircuitCurve, points: Array) -> Mask:
     ahead = _add_friction(curve, points, 1)
     return (ahead <= 0.0) & (_add_friction(curve, points, -1) >= 0.0)
 
 
-def _find_moves(curve: CircuitCurve, positions: Solution) -> NDArray[np.int8]:
+def _find_moves(curve: CircuitCurve, positions: Solution) -> Signs:
     """Return the sign of the change of theta_2 at each released position, 0 at rest."""
     psi = positions.theta_2 - curve.theta_1
     mu = positions.branch * transmission_angle(curve.ratios, psi)
@@ -438,7 +440,7 @@ def _find_moves(curve: CircuitCurve, positions: Solution) -> NDArray[np.int8]:
 
 def _list_ranges(
     curve: CircuitCurve,
-    holds: Callable[[Array], NDArray[np.bool_]],
+    holds: Callable[[Array], Mask],
     least: int,
     known: Sequence[float] | Array = (),
 ) -> list[_CircuitRange]:
@@ -450,7 +452,7 @@ def _list_ranges(
     known : places at which the condition holds, besides those of the grid.
     """
 
-    def there(tau: Array) -> NDArray[np.bool_]:
+    def there(tau: Array) -> Mask:
         points = curve.points(tau)
         inside = curve.inside(points[:, 0])
         inside[inside] = holds(points[inside])  # a load may have no value beyond
@@ -472,7 +474,7 @@ def _list_ranges(
     order = np.argsort(tau)
     tau = tau[order]
 
-    def locate(rows: NDArray[np.intp], ends: Array) -> Array:
+    def locate(rows: Indices, ends: Array) -> Array:
         beyond = np.where(ends == tau[rows], tau[rows + 1], tau[rows])
         return bisect(there, ends, beyond)[0]
 

@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.formulas.mobility import TURN, find_circuit_where
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices, Mask, Signs
 from fourbar.solution import Solution, shift_to_drawing
 from fourbar.studies.course import MotionCourse, states_single_positions
 
@@ -64,7 +63,7 @@ def measure_paths(solution: Solution) -> dict[str, Path]:
     }
 
 
-def _find_circuits(solution: Solution) -> NDArray[np.int8]:
+def _find_circuits(solution: Solution) -> Signs:
     return find_circuit_where(
         solution.assembled, solution.scene.linkage, solution.theta_2, solution.branch
     )
@@ -108,7 +107,7 @@ def _locate_point(
     return np.where(beyond[:, None], np.nan, points)
 
 
-def _list_extremes(points: Array, missed: float) -> NDArray[np.intp]:
+def _list_extremes(points: Array, missed: float) -> Indices:
     """List the rows of the points that decide the extents of a path.
 
     `missed`: part of the path by which the points may miss an extreme.
@@ -184,7 +183,7 @@ def _list_hull(points: Array) -> list[int]:
     return corners or order[:1]
 
 
-def _list_first_ends(heights: Array, stated: NDArray[np.bool_]) -> list[int]:
+def _list_first_ends(heights: Array, stated: Mask) -> list[int]:
     """List the rows of the least and the greatest height.
 
     Of heights that differ by rounding, as where a law comes to rest, one is taken where
@@ -199,7 +198,7 @@ def _list_first_ends(heights: Array, stated: NDArray[np.bool_]) -> list[int]:
     return rows
 
 
-def _measure_points(places: Array, points: Array, stated: NDArray[np.bool_]) -> Path:
+def _measure_points(places: Array, points: Array, stated: Mask) -> Path:
     """Measure the points of a path, at these places of the motion.
 
     `stated`: True where the motion begins, ends, or has a new part of a law.

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect, needing
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import require_whole
-from fourbar.quantities import NOT_ASSEMBLED, Array
+from fourbar.quantities import NOT_ASSEMBLED, Array, Indices, Mask
 from fourbar.scene import Scene, command
 from fourbar.solution import SHOWN_PARTS, find_values, is_scalar, split_parts
 from fourbar.solving import split
@@ -74,7 +73,7 @@ class Spread(NamedTuple):
         return np.asarray(np.sqrt(self.shares.sum(axis=0)))
 
     @property
-    def parted(self) -> NDArray[np.bool_]:
+    def parted(self) -> Mask:
         """Mark where first order and samples differ by more than `PARTED`.
 
         Positions at which only samples have a value are marked too.
@@ -100,7 +99,7 @@ class Tolerances:
     """Spreads by quantity. Vectors are components F12_x, F12_y; pin forces are also
     magnitudes |F12|.
     """
-    without: NDArray[np.intp]
+    without: Indices
     """Members without a value of everything at each position, (n,)."""
     apart: int
     """Members that fail to assemble at a position. The nominal linkage assembles there.

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.linkage import BAR_NAMES, convert_to_unit
-from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array
+from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array, Mask
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit_of_key
@@ -39,7 +38,7 @@ class Study:
 
     A member that a scene would refuse has NaN.
     """
-    invalid: NDArray[np.bool_]
+    invalid: Mask
     """The members that a scene would refuse, (m,)."""
     at: Command
     """Commanded angle and branch (m, n), with speed and acceleration. The latter are
