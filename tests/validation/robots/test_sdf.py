@@ -290,6 +290,11 @@ STATED["gravity in <mujoco> of a URDF"] = write_urdf(LOOP_JOINT + GRAVITY).repla
     '<link name="world"/><link name="base"/><joint name="tilt" type="fixed"><parent'
     f' link="world"/><child link="base"/><origin rpy="{-math.pi / 2} 0 0"/></joint>',
 )
+STATED["frame without mass in a URDF"] = write_urdf(
+    f'{LOOP_JOINT}<link name="tip"><inertial><mass value="1e-12"/><inertia ixx="0"'
+    ' ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link><joint name="to tip"'
+    ' type="fixed"><parent link="rod"/><child link="tip"/></joint>'
+)
 STATED["ball constraint of a URDF"] = write_urdf(
     '<drake:ball_constraint><drake:ball_constraint_body_A name="rod"/>'
     f'<drake:ball_constraint_p_AP value="{B} 0 0"/>'
@@ -766,8 +771,9 @@ def test_of_a_urdf_mimic_joints_are_listed_and_the_way_on_is_said(
     report = report_of(read(tmp_path, text))
     (closure,) = report.closures
     assert closure.reason.startswith("knee follows hip, polycoef 0.2 -1.5 0 0 0")
-    notes = ("left out of the URDF: gazebo", *ways)
-    assert report.notes[: len(notes)] == notes
+    *notes, raised, _ = report.notes
+    assert notes == ["left out of the URDF: gazebo", *ways]
+    assert re.search("refuses .* 'two'.*: masses below 1e-06 kg", raised)
 
 
 def test_two_points_of_one_pin_are_two_connects(compiled):

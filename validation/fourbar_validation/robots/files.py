@@ -194,10 +194,7 @@ class _RobotReading:
         return root
 
     def _reduce_urdf(self, root: ET.Element) -> None:
-        """Leave what MuJoCo's own reader of URDF needs: inertias and joints.
-
-        A polynomial is judged by the motion alone, so that links without mass get one.
-        """
+        """Leave what MuJoCo's own reader of URDF needs: inertias and joints."""
         pins = self._take_pins(root)
         kept = ("link", "joint", "material", "mujoco", "compiler", "option")
         stated = root.findall("mujoco/*")
@@ -213,15 +210,11 @@ class _RobotReading:
                 self.path.name, 'is a xacro: "xacro FILE > robot.urdf" writes its URDF'
             )
         closing = [one.get("name", "") for one in root.findall("gazebo/joint")]
-        bounds = {"boundmass": "1e-6", "boundinertia": "1e-9", "balanceinertia": "true"}
-        for compiler in root.findall("mujoco/compiler"):
-            bounds |= compiler.attrib
         root[:] = [child for child in root if child.tag in ("link", "joint")] + pins
         for link in root.iter("link"):
             link[:] = link.findall("inertial")
         settings = ET.SubElement(root, "mujoco")
-        ET.SubElement(settings, "compiler", bounds)
-        settings.extend(one for one in stated if one.tag == "option")
+        settings.extend(one for one in stated if one.tag in ("compiler", "option"))
         self._refuse_cycles(root)
         if left_out:
             self.notes.append(f"left out of the URDF: {', '.join(sorted(left_out))}")

@@ -43,6 +43,10 @@ _MOST_KEYFRAMES = 100_000
 """A robot has a few; MuJoCo reserves as many as a file asks for, minutes long."""
 _LARGEST_NUMBER = 1e100
 """m, kg or kg m^2 whose square is a double."""
+_LEAST_MASS = 1e-6
+"""kg, of a link of a URDF that states less than MuJoCo takes."""
+_LEAST_MOMENT = 1e-9
+"""kg m^2, of such a link."""
 _OTHER_SCALE = 1e3
 """Scale at which what stands in for a mesh gives every body that has it another mass.
 """
@@ -108,7 +112,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
         }
         other = spec.copy()  # compiling takes what is only visual out of it
-        model = spec.compile()
+        model, raised = _compile_links(spec, file)
         masses = _list_unknown_masses(other, file, model)
     except ValueError as error:
         # its lines are those of a text that is written anew, and not of the file
@@ -133,7 +137,7 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         largest = float(np.abs(getattr(model, name)).max(initial=0.0))
         if not largest < _LARGEST_NUMBER:
             raise InputError("MJCF", None, f"{name} of {largest:g} is out of range")
-    notes = list(file.notes)
+    notes = [*file.notes, *raised]
     if left_out := {*file.missing.values()}:
         notes.append(
             f"meshes that are missing are left out: {len(left_out)}, the first of them "
@@ -146,6 +150,32 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
             "inertial is stated; --assets DIR says where the meshes are"
         )
     return CompiledRobot(model, tuple(notes), masses, quaternions)
+
+
+def _compile_links(
+    spec: mujoco.MjSpec, file: RobotFile
+) -> tuple[mujoco.MjModel, list[str]]:
+    """Compile a model, a URDF whose links MuJoCo refuses with others; a note says so.
+
+    Links without mass bear the polynomials of mimic joints, which have no forces.
+    """
+    given = spec.copy()
+    try:
+        return spec.compile(), []
+    except ValueError as error:
+        if file.kind != "URDF":
+            raise
+        refused = " ".join(str(error).split("\n")[:2])
+    bounds = given.compiler
+    bounds.boundmass = max(bounds.boundmass, _LEAST_MASS)
+    bounds.boundinertia = max(bounds.boundinertia, _LEAST_MOMENT)
+    bounds.balanceinertia = True
+    return given.compile(), [
+        f"MuJoCo refuses the links as they stand ({refused}): masses below"
+        f" {_LEAST_MASS:g} kg and moments of inertia below {_LEAST_MOMENT:g} kg m^2 are"
+        " raised to these, and three moments of which one exceeds the sum of the others"
+        " become their mean"
+    ]
 
 
 def list_unknown_parts(robot: CompiledRobot, bodies: set[int]) -> list[str]:
