@@ -570,7 +570,7 @@ class FourBar(Described):
     coupler: Bar
     output: Bar
     ground_angle: Annotated[float, Declared("rad")] = 0.0
-    stated_at: ClassVar[str] = "lengths"
+    stated_at = "lengths"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)

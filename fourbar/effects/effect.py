@@ -314,7 +314,7 @@ class Effect(Placed):
     """Base class of an effect: what it does to the bars, and where it has no value."""
 
     __slots__ = ()
-    stated_at: ClassVar[str] = "effects.{0.key}"
+    stated_at = "effects.{0.key}"
     key: ClassVar[str]
     """Name of the effect under ``[effects]`` and in every table."""
     example: ClassVar[str] = ""

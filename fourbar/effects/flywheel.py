@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from fourbar.effects.effect import Effect
 from fourbar.linkage import AT_LEAST_ZERO, Declared, OfBar
@@ -20,9 +20,9 @@ class Flywheel(Effect):
 
     inertia: Annotated[float, Declared("kg m^2", AT_LEAST_ZERO)]
     bar: Annotated[int, OfBar((2, 4), "a bar on a fixed pin")] = 2
-    key: ClassVar[str] = "flywheel"
-    in_balls: ClassVar[bool] = True
-    example: ClassVar[str] = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
+    key = "flywheel"
+    in_balls = True
+    example = 'flywheel = { bar = 2, inertia = "0.02 kg m^2" }'
 
     @property
     def added_inertia(self) -> Mapping[int, float]:

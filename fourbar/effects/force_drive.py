@@ -13,7 +13,7 @@ for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -34,8 +34,8 @@ class ForceDrive(Placed, ABC):
     """A drive that exerts a force, N; a subclass says where and in which direction."""
 
     __slots__ = ()
-    stated_at: ClassVar[str] = "drive"
-    has_stroke: ClassVar[bool] = False
+    stated_at = "drive"
+    has_stroke = False
     """True if the drive is between two points, whose distance is its stroke."""
 
     @property

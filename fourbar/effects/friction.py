@@ -19,12 +19,12 @@ class Friction(PinRows):
     """
 
     torques: tuple[tuple[str, float], ...]
-    key: ClassVar[str] = "friction"
-    in_balls: ClassVar[bool] = True
-    joint_elements: ClassVar[dict[str, str]] = {"gazebo": "friction"}
-    example: ClassVar[str] = 'friction = { A = "0.05 N m" }'
-    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m", AT_LEAST_ZERO)}
-    dry: ClassVar[bool] = True
+    key = "friction"
+    in_balls = True
+    joint_elements: ClassVar = {"gazebo": "friction"}
+    example = 'friction = { A = "0.05 N m" }'
+    numbers: ClassVar = {"": Declared("N m", AT_LEAST_ZERO)}
+    dry = True
 
     @property
     def dry_pins(self) -> tuple[str, ...]:

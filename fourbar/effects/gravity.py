@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
@@ -16,9 +16,9 @@ class Gravity(Effect):
 
     magnitude: Annotated[float, Declared("m/s^2", key="0")] = 9.81
     angle: Annotated[float, Declared("rad", key="1")] = -math.pi / 2
-    key: ClassVar[str] = "gravity"
-    in_balls: ClassVar[bool] = True
-    example: ClassVar[str] = 'gravity = ["9.81 m/s^2", "-90 deg"]'
+    key = "gravity"
+    in_balls = True
+    example = 'gravity = ["9.81 m/s^2", "-90 deg"]'
 
     @property
     def field(self) -> Any:

@@ -1,7 +1,7 @@
 """A drive along the line between two points of two bars, such as a cylinder."""
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class LinearDrive(Line, ForceDrive):
 
     start: Annotated[Place, At("from")]
     end: Annotated[Place, At("to")]
-    has_stroke: ClassVar[bool] = True
+    has_stroke = True
 
     @property
     def ends(self) -> tuple[tuple[float, Place], tuple[float, Place]]:

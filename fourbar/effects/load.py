@@ -6,7 +6,7 @@ A load is constant or a table over theta_2.
 import math
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -56,8 +56,8 @@ class Table(Described):
 
     theta_2: Annotated[tuple[float, ...], Listed("rad")]
     factor: Annotated[tuple[float, ...], Listed("1")]
-    stated_at: ClassVar[str] = "loads.table"
-    as_given: ClassVar[bool] = True
+    stated_at = "loads.table"
+    as_given = True
     """Error bars leave its numbers alone: they are looked up."""
 
     def __post_init__(self) -> None:
@@ -181,8 +181,8 @@ class Load(Effect):
     moment: Annotated[float, Declared("N m")] = 0.0
     frame: Annotated[str, OneOf(FRAMES)] = "world"
     table: Annotated[Table | None, Part(Table)] = None
-    stated_at: ClassVar[str] = "loads"
-    key: ClassVar[str] = "load"
+    stated_at = "loads"
+    key = "load"
 
     def __post_init__(self) -> None:
         Effect.__post_init__(self)

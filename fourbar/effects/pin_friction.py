@@ -63,15 +63,13 @@ class PinFriction(PinRows):
     """
 
     pins: tuple[tuple[str, float, float], ...]
-    key: ClassVar[str] = "pin_friction"
-    example: ClassVar[str] = (
-        'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
-    )
-    numbers: ClassVar[dict[str, Declared]] = {
+    key = "pin_friction"
+    example = 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
+    numbers: ClassVar = {
         "coefficient": Declared("1", AT_LEAST_ZERO),
         "radius": Declared("m", AT_LEAST_ZERO),
     }
-    dry: ClassVar[bool] = True
+    dry = True
 
     @property
     def loaded_pins(self) -> tuple[str, ...]:

@@ -60,8 +60,8 @@ class Spring(Line):
         default=None, compare=False, repr=False
     )
     acts: Annotated[str | None, OneOf(SENSES)] = None
-    stated_at: ClassVar[str] = "effects.springs"
-    forms: ClassVar[dict[str, dict[str, Declared]]] = {"gas": GAS}
+    stated_at = "effects.springs"
+    forms: ClassVar = {"gas": GAS}
 
     def __post_init__(self) -> None:
         Line.__post_init__(self)
@@ -166,9 +166,9 @@ class Springs(Effect):
     """
 
     springs: Annotated[tuple[Spring, ...], Entries(Spring, is_value=True)]
-    key: ClassVar[str] = "springs"
-    in_balls: ClassVar[bool] = True
-    example: ClassVar[str] = (
+    key = "springs"
+    in_balls = True
+    example = (
         'springs = [{ from = { bar = 1, from_pin = ["10 cm", "-90 deg"] }, '
         'to = { bar = 4, from_pin = ["8 cm", "0 deg"] }, '
         'stiffness = "200 N/m", length = "12 cm", preload = "3 N" }]'

@@ -34,14 +34,14 @@ class Torsion(PinRows):
     springs: tuple[tuple[str, float, float, float], ...]
     turns: tuple[Number, ...] | None = None
     """Whole turns of each pin where the motion begins, rad; not part of a scene."""
-    counts_turns: ClassVar[bool] = True
-    key: ClassVar[str] = "torsion"
-    in_balls: ClassVar[bool] = True
-    example: ClassVar[str] = (
+    counts_turns = True
+    key = "torsion"
+    in_balls = True
+    example = (
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg",'
         ' preload = "0.1 N m" } }'
     )
-    numbers: ClassVar[dict[str, Declared]] = {
+    numbers: ClassVar = {
         "stiffness": Declared("N m/rad", POSITIVE),
         "rest": Declared("rad"),
         "preload": Declared("N m", left_out=0.0),

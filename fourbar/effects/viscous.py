@@ -13,11 +13,11 @@ class Viscous(PinRows):
     """Damping coefficients per pin, N m s/rad, as pairs (pin, value)."""
 
     coefficients: tuple[tuple[str, float], ...]
-    key: ClassVar[str] = "viscous"
-    in_balls: ClassVar[bool] = True
-    joint_elements: ClassVar[dict[str, str]] = {"gazebo": "damping", "drake": "damping"}
-    example: ClassVar[str] = 'viscous = { O2 = "0.01 N m s/rad" }'
-    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
+    key = "viscous"
+    in_balls = True
+    joint_elements: ClassVar = {"gazebo": "damping", "drake": "damping"}
+    example = 'viscous = { O2 = "0.01 N m s/rad" }'
+    numbers: ClassVar = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
 
     def act(self, actions: Actions, state: State) -> None:
         """Add M on bar j = -k (omega_j - omega_i), its opposite on bar i."""

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import cross, vector
@@ -29,7 +29,7 @@ class DrawnPins(Described):
     A: Annotated[PlanePoint, DRAWN_PLACE]
     B: Annotated[PlanePoint, DRAWN_PLACE]
     O4: Annotated[PlanePoint, DRAWN_PLACE]
-    stated_at: ClassVar[str] = "pins"
+    stated_at = "pins"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)

@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from itertools import accumulate
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -106,7 +106,7 @@ class FromLimit(Described):
 
     limit: Annotated[int, Whole(1, 4)]
     offset: _Angle = 0.0
-    stated_at: ClassVar[str] = "motion.theta_2"
+    stated_at = "motion.theta_2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class Free(Described):
 
     duration: _Duration
     steps: _Steps
-    stated_at: ClassVar[str] = "motion.free"
+    stated_at = "motion.free"
 
 
 def _find_command(key: str, stated: Any) -> tuple[str, str, str] | None:
@@ -195,7 +195,7 @@ class Law(Described, _OverTime):
     alpha_2: _Accelerations = None
     alpha_3: _Accelerations = None
     alpha_4: _Accelerations = None
-    stated_at: ClassVar[str] = "motion.law"
+    stated_at = "motion.law"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
@@ -317,7 +317,7 @@ class Rise(Described, _OverTime):
     steps: _Steps = 360
     theta_3: _FirstAngle = None
     theta_4: _FirstAngle = None
-    stated_at: ClassVar[str] = "motion.law"
+    stated_at = "motion.law"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
@@ -384,8 +384,8 @@ class Sine(Described, _OverTime):
     phase: _Angle = 0.0
     steps: _Steps = 360
     kind: Annotated[str, OneOf((SINE_LAW,))] = SINE_LAW
-    stated_at: ClassVar[str] = "motion.law"
-    bar: ClassVar[int] = 2
+    stated_at = "motion.law"
+    bar = 2
 
     @property
     def time(self) -> tuple[float, float]:

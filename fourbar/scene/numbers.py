@@ -5,7 +5,7 @@ Units are declared where the numbers belong.
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from fourbar import effects
 from fourbar.effects.place import (
@@ -55,7 +55,7 @@ class Point(Placed):
     bar: Annotated[int, OfBar((1, *MOVING_BARS))]
     from_pin: StatedPair = None
     from_centre: StatedPair = None
-    stated_at: ClassVar[str] = "points.{0.name}"
+    stated_at = "points.{0.name}"
 
     def __post_init__(self) -> None:
         plain = (

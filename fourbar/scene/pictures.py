@@ -9,7 +9,7 @@ import base64
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from fourbar.errors import InputError, expect
 from fourbar.linkage import (
@@ -108,7 +108,7 @@ class TracedPicture(_PictureFile, Described):
     angle: Annotated[float, Declared("rad")] = 0.0
     opacity: Annotated[float, Declared("1", AT_LEAST_ZERO)] = 0.5
     folder: str = "."
-    stated_at: ClassVar[str] = "picture"
+    stated_at = "picture"
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
