@@ -102,7 +102,9 @@ class _Description:
         skew = seen.loop.misaligned
         self.put("plane", seen.plane)
         self.put("skew", skew if skew > PARALLEL_AXES else 0.0)
-        for name, length in zip(BAR_NAMES.values(), seen.loop.lengths, strict=True):
+        # those of a parallelogram or kite within the digits of the file, else its own
+        lengths = seen.loop.met if seen.loop.rounding else seen.loop.lengths
+        for name, length in zip(BAR_NAMES.values(), lengths, strict=True):
             self.put(f"lengths.{name}", length)
         for bar in MOVING_BARS:
             self.add_bar(bar, flywheel if bar == 2 else 0.0)

@@ -1,6 +1,7 @@
 """Lengths of a robot's loop within the digits of its file."""
 
 import math
+import re
 from dataclasses import replace
 
 import mujoco
@@ -9,15 +10,19 @@ import pytest
 from pytest import approx
 
 from fourbar.formulas.mobility import classify
+from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
     LoopInside,
 )
 from fourbar_validation.engines.mujoco.robots.loop_scene import find_rounding
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
+from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import (
+    AS_DRAWN,
     FOOT_PARALLELOGRAM,
+    file_of,
     measure,
     pose_loop,
     read_scene,
@@ -116,6 +121,24 @@ def test_what_is_read_as_equal_is_said_with_its_difference():
         "lengths read as equal within the digits of the file: ground and coupler, which"
         f" differ by {coupler:.4g} m; input and output, which differ by {output:.4g} m"
     )
+
+
+def test_a_file_has_the_lengths_of_the_scene_that_was_made_from_it():
+    """Another loop, whose own lengths are round, is no nearer to them."""
+    body = FREE.partition("<worldbody>")[2].partition("</worldbody>")[0]
+    closure = FREE.partition("<equality>")[2].partition("</equality>")[0]
+    body, closure = (
+        re.sub('"(foot|pitch|rod|ankle|crank|motor)"', r'"round \1"', text)
+        for text in (body, closure)
+    )
+    body = body.replace(ROD, "-0.06 0 0").replace(f' quat="{QUATERNION}"', "")
+    text = FREE.replace("</worldbody>", f"{body}</worldbody>")
+    file = file_of(text.replace("</equality>", f"{closure}</equality>"))
+    scene = read_scene(FREE).scene
+    found = find_loop_of_scene(file, scene, AS_DRAWN)
+    described = describe_model(found.see(), 0.0)
+    assert described["lengths.output"].value == scene.linkage.output.length
+    assert found.loop.name == "rod" and found.loop.remarks
 
 
 def test_the_range_of_the_motor_is_that_of_the_file():

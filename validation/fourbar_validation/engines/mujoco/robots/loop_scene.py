@@ -268,7 +268,7 @@ class SceneOfLoop(SeenLoop):
         """Describe the scene."""
         lumps = {bar: self.lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
-        lengths = self.meet_lengths()
+        lengths = self.meet_lengths().met
         bars = {}
         for bar, lump in lumps.items():
             inertia = lump.inertia + (armature.get("O4", 0.0) if bar == 4 else 0.0)
@@ -296,8 +296,8 @@ class SceneOfLoop(SeenLoop):
             linkage, motion, loads=loads, effects=effects, title=title, source=source
         )
 
-    def meet_lengths(self) -> tuple[float, ...]:
-        """Return the lengths within the digits of the file, and say which are equal.
+    def meet_lengths(self) -> RobotLoop:
+        """Read the lengths within the digits of the file, and say which are equal.
 
         MuJoCo saves positions and quaternions with six significant digits, and so do
         many generators. The lengths of a parallelogram then differ in their seventh
@@ -305,7 +305,7 @@ class SceneOfLoop(SeenLoop):
         a scene that states rounded lengths or coordinates, the lengths are those of the
         parallelogram or kite that the digits cannot tell from the file's.
         """
-        d, a, b, c = self.loop.met
+        d, a, b, c = map(round_off, self.loop.lengths)
         stated = (d, a, b, c)
         met = tuple(map(round_off, self._meet_lengths(stated)))
         equal = [
@@ -318,7 +318,7 @@ class SceneOfLoop(SeenLoop):
                 f" {'; '.join(equal)}"
             )
         self.loop = replace(self.loop, read_lengths=met)
-        return met
+        return self.loop
 
     def _meet_lengths(self, lengths: Lengths) -> Lengths:
         """Return lengths, of a parallelogram or a kite without their rounding."""

@@ -162,6 +162,7 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
     ways = [*loops]
     if options.pose.drive is None:
         ways = [way for one in loops for way in (one, one.from_other_end or one)]
+    ways = [SceneOfLoop(posed, way).meet_lengths() for way in ways]
     model = posed.model
     names = [name_body(model, body) for body in range(model.nbody)]
     wanted = {}
@@ -182,11 +183,12 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
     loop, robot = close_onto(scene, posed, loop)
     described = SceneOfLoop(robot, loop)
-    described.meet_lengths()
+    loop = described.meet_lengths()
+    remarks = (*loop.remarks, *described.remarks)
     return LoopOfScene(
         file,
         robot,
-        turn(described.loop, scene),
+        turn(replace(loop, remarks=remarks), scene),
         described.write_parts(),
         scene,
         as_it_is=not loop.held,
@@ -322,7 +324,7 @@ def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
 
 def miss_lengths(scene: Scene, loop: RobotLoop) -> float:
     """Return by how much a loop's lengths miss those of a scene: sum of |log ratio|."""
-    apart = np.log(scene.linkage.lengths) - np.log(loop.lengths)
+    apart = np.log(scene.linkage.lengths) - np.log(loop.met)
     return float(np.abs(apart).sum())
 
 
