@@ -214,8 +214,7 @@ def test_on_a_change_point_the_pin_forces_alone_have_no_value():
     assert finite(solution, "torque") and np.isnan(solution.F12[1]).all()
     # the drive on 3: bars 2 and 4 of the parallelogram are parallel, those of the
     # antiparallelogram are not
-    statuses = {1: "no_torque", -1: "ok"}
-    for branch, expected in statuses.items():
+    for branch, expected in {1: "no_torque", -1: "ok"}.items():
         motion = motion.replace(branch=branch)
         at_all = solved(Scene(PARALLELOGRAM, motion, 3)).status
         assert at_all == [expected, "change_point", expected]
@@ -230,8 +229,7 @@ def test_beyond_the_range_of_doubles_the_status_says_so_from_that_stage_on():
     assert lost(solution, *FORCES)
     assert finite(solution, "theta_3", "omega_3", "alpha_3", "a_G3")
     assert solved(scene, "acceleration").status == ["ok"] * 5
-    at_rest = replace(scene, motion=Motion(angles, 0.0))
-    assert solved(at_rest).status == ["ok"] * 5
+    assert solved(replace(scene, motion=Motion(angles, 0.0))).status == ["ok"] * 5
     long = uniform(30.0, 10.0, 25.0, 22.0)
     fast = solved(Scene(long, Motion(np.array([0.3]), 1e154)))
     assert fast.status == ["overflow"] and fast.omega_2 == [1e154]
@@ -254,8 +252,7 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
     """
     friction = PinFriction.at(A=(0.9, 0.2))
     motion = Motion(np.linspace(0.1, 6.2, 60), 0.0)
-    scene = Scene(CRANK_ROCKER, motion, 4, effects=(Gravity(), friction))
-    solution = solved(scene)
+    solution = solved(Scene(CRANK_ROCKER, motion, 4, effects=(Gravity(), friction)))
     jammed = solution.status_code == JAMMED
     assert jammed.any() and np.isfinite(solution.torque).all()
     lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)

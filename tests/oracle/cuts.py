@@ -62,12 +62,10 @@ def internal_forces(question):
                 np.stack([getattr(piece, of) for piece in pieces], axis=1)
                 for of in (name, terms)
             )
-            apart = np.abs(getattr(forces, name) - theirs)
-            error = divide(apart, size).max(axis=1)
+            error = divide(np.abs(getattr(forces, name) - theirs), size).max(axis=1)
             if name == "M":
                 beyond = np.abs(theirs).max(axis=1) - np.abs(forces.largest.moment)
                 error = np.maximum(error, divide(beyond, size.max(axis=1)))
-            reason = f"bar {bar} cut at {len(cuts)} places, at {len(error)} positions"
             rows.append(
                 make_row(
                     question,
@@ -76,7 +74,7 @@ def internal_forces(question):
                     error,
                     CUT,
                     solution.theta_2,
-                    reason,
+                    f"bar {bar} cut at {len(cuts)} places, at {len(error)} positions",
                 )
             )
     return rows

@@ -290,9 +290,8 @@ def _derive_torque(scene, bar, angle, branch):
         held, ahead, behind, pushed = answers
         slope = (ahead["torque"] - behind["torque"]) / (2 * step)
         angles = [held.get(f"theta_{k}", base_inputs[commanded]) for k in MOVING_BARS]
-        numbers = [held["torque"], slope, pushed["torque"] - held["torque"], *angles]
         return (
-            numbers,
+            [held["torque"], slope, pushed["torque"] - held["torque"], *angles],
             held,
             (ahead.get("theta_2", step) - held.get("theta_2", 0)) / step,
         )

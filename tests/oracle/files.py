@@ -72,8 +72,7 @@ def _judge_file(question, engine, read):
     if question.at.commanded != "theta_2":
         raise NotAskedError(f"{question.at.commanded} is commanded")
     # a drive at a named point keeps its place without the point
-    few = state_from_pins(take_few(question))
-    scene = replace(few, loads=(), points=())
+    scene = replace(state_from_pins(take_few(question)), loads=(), points=())
     opened = at_places(scene, scene.motion.theta_2[:1])
     try:
         held = read(opened)
@@ -195,13 +194,11 @@ def _read_usd(text):
             at_joints[names[1]] = at_joints[names[0]] + between
     closing = at_joints | {"coupler": at_joints["coupler at B"]}
     (pull,) = numbers(blocks["physics"], "physics:gravityMagnitude")
-    direction = "physics:gravityDirection"
-    gravity = pull * complex(*numbers(blocks["physics"], direction)[:2])
     return Contents(
         bodies,
         pins,
         [_read_turns(bodies), at_joints, closing, _read_noted(text)],
-        gravity,
+        pull * complex(*numbers(blocks["physics"], "physics:gravityDirection")[:2]),
         {},
         {},
     )

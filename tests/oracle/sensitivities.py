@@ -92,11 +92,9 @@ def _judge_study(question, scene, nominal, keys):
         solved = fourbar.solve(fourbar.vary(scene, values))
         for number, part in enumerate(parts):
             changes = {key: part * step for key, (_, step) in stated.items()}
-            file = SceneFile(at_places(scene, values[commanded][number]))
-            one = file.move(changes)
+            one = SceneFile(at_places(scene, values[commanded][number])).move(changes)
             answer = ask_beside(one, scene, nominal)
-            ours = take_member(solved, number)
-            rows += hold_to(question, "study", one, ours, answer)
+            rows += hold_to(question, "study", one, take_member(solved, number), answer)
     return rows
 
 

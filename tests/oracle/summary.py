@@ -119,8 +119,7 @@ class _SummaryJudge:
         turned = law.phase + law.frequency * law.duration
         phases = np.arange(law.phase // np.pi, turned / np.pi) * np.pi + 0.5 * np.pi
         turns = (phases - law.phase) / law.frequency
-        inside = (turns > 0.0) & (turns < law.duration)
-        return np.union1d(self.edges, turns[inside])
+        return np.union1d(self.edges, turns[(turns > 0.0) & (turns < law.duration)])
 
     @cached_property
     def fine_places(self):
@@ -382,10 +381,8 @@ def _judge_integrals(judged):
         judged.add("integrals", 0.0 if entry["energy_swing"] is None else np.inf)
         return
     given = sums[0] - sums[1]
-    level = given * second / np.ptp(judged.edges)
-    surplus = panels.accumulate("power", level) / second
-    swing = abs(entry["energy_swing"] - np.ptp(surplus))
-    judged.add("integrals", divide(swing, most))
+    surplus = panels.accumulate("power", given * second / np.ptp(judged.edges)) / second
+    judged.add("integrals", divide(abs(entry["energy_swing"] - np.ptp(surplus)), most))
     at = judged.solution.at
     if judged.scene.drive is None and judged.scene.drive_bar == at.bar:
         turned = np.sign(np.mean(at.speed)) * abs(at.angle[-1] - at.angle[0])

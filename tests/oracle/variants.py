@@ -235,8 +235,7 @@ def is_near_change_point(linkage):
     """Return whether two lengths are together nearly as long as the other two."""
     d, a, b, c = linkage.lengths
     differences = d + a - b - c, d + b - a - c, d + c - a - b
-    least = min(map(abs, differences))
-    return least <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
+    return min(map(abs, differences)) <= MISS_OF_A_CHANGE_POINT * sum_lengths(linkage)
 
 
 def ask_beside(member, scene, nominal):

@@ -103,8 +103,7 @@ def _loaded(ratio):
 
 def _starts(acceleration):
     """Tell whether the file brings the crank from rest to its speed in two steps."""
-    timestep = _BASE.motion.speed / (2.0 * acceleration)
-    settings = replace(RECIPE, timestep=timestep)
+    settings = replace(RECIPE, timestep=_BASE.motion.speed / (2.0 * acceleration))
     loop = ClosedLoop(write_mjcf(_BASE, settings))
     mujoco.mj_step(loop.model, loop.data, 10)
     return not loop.bad()

@@ -255,8 +255,7 @@ def report_of(file, **pose):
 def pose_loop(file, name=None, **pose):
     """Return a robot in its pose, and its loop of this name or the first one."""
     posed = pose_robot(file_of(file), PoseOptions(**pose))
-    found = find_closures(posed, name)
-    return posed, next(one.loop for one in found if one.loop)
+    return posed, next(one.loop for one in find_closures(posed, name) if one.loop)
 
 
 def read_scene(text, loop=None, speed=3.0, **pose):

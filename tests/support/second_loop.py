@@ -139,8 +139,7 @@ class Loop:
 
     def balance(self, angles, speeds, accelerations):
         """Find each pin's force from Newton's law of its bar."""
-        unit = np.exp(1j * angles)
-        bent = unit * (1j * accelerations - speeds**2)
+        bent = np.exp(1j * angles) * (1j * accelerations - speeds**2)
         of_centres = self.bodies.centre * bent
         of_centres[1] += self.a * bent[0]
         needed = self.bodies.mass * (of_centres - self.gravity)

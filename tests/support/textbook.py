@@ -141,8 +141,7 @@ class Bodies:
         force, couple = self.applied(omega)
         weights = np.concatenate((self.mass, self.mass, self.inertia))
         needed = weights * accelerations - [*force.real, *force.imag, *couple]
-        driven = self.jacobian(self.scene.drive_bar)
-        *pins, torque = np.linalg.solve(driven.T, needed)
+        *pins, torque = np.linalg.solve(self.jacobian(self.scene.drive_bar).T, needed)
         pairs = np.reshape(pins, (2, 4)).T
         values = {"torque": torque}
         for k in (1, 2):

@@ -52,9 +52,8 @@ def compute_row(text, steps, folder):
         return judge_trial(SCENE, setup.try_out(read_settings(text, steps)))
     if "Euler" in text:
         steps = 2.0 * math.pi / float(SCENE.motion.omega_2) / MUJOCO_TIMESTEP
-    integrator = text.partition(",")[0]
     settings = replace(
-        BEST, pad=None, integrator=integrator, steps_per_revolution=steps
+        BEST, pad=None, integrator=text.partition(",")[0], steps_per_revolution=steps
     )
     setup = work_precision.CostStudy("page", SCENE, folder).setup(settled=True)
     trial = setup.try_out(settings, restore_defaults)

@@ -259,8 +259,7 @@ how much a capital is broader.
 @mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_no_table_is_wider_than_the_column_of_a_page(page):
     """A cell breaks between words, so its longest word decides."""
-    flags = re.MULTILINE | re.DOTALL
-    prose = re.sub(r"^(```|\$\$).*?\1$", "", read(page), flags=flags)
+    prose = re.sub(r"^(```|\$\$).*?\1$", "", read(page), flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"\[([^]\n]*)\]\([^)\n]*\)", r"\1", prose)
     for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         head, _, *rows = (line.strip("|").split("|") for line in table.splitlines())
@@ -291,8 +290,7 @@ def test_the_architecture_names_every_layer_and_no_other():
     uses = runpy.run_path(DOCS / "architecture.py")["uses"]
     for package in ("fourbar", "fourbar_validation"):
         first = first_column("architecture", f"\n## {package}\n\n")
-        listed = re.findall(r"`(\w+)/?`", first)
-        assert sorted(listed) == sorted(uses(package))
+        assert sorted(re.findall(r"`(\w+)/?`", first)) == sorted(uses(package))
 
 
 def test_the_figure_of_the_theory_is_the_one_that_is_drawn():
@@ -342,8 +340,7 @@ def shown(name):
 
 
 def test_the_pump_jack_has_a_stroke_of_54_inches():
-    swing = fourbar.swing(shown("pump_jack").linkage)
-    assert swing * 72.0 == approx(54.0, rel=0.03)
+    assert fourbar.swing(shown("pump_jack").linkage) * 72.0 == approx(54.0, rel=0.03)
 
 
 def test_the_cylinder_of_the_bucket_has_the_stroke_of_its_source():

@@ -80,8 +80,7 @@ def test_a_free_motion_without_end_is_given_up_with_its_reason(
 ):
     file, out = tmp_path / "released.toml", tmp_path / "out.csv"
     file.write_text(RELEASED)
-    most = "fourbar.evaluation.free_motion.MOST_INTEGRATION_STEPS"
-    monkeypatch.setattr(most, 500)
+    monkeypatch.setattr("fourbar.evaluation.free_motion.MOST_INTEGRATION_STEPS", 500)
     assert fourbar.cli.status(["analyze", str(file), "-o", str(out)]) == BAD_INPUT
     complained = read_complaint(capsys)
     assert "released.toml: motion.free.duration = 1000000000.0" in complained

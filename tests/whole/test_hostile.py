@@ -126,8 +126,7 @@ def test_differences_hold_hostile_names_as_text(tmp_path, capsys):
     forms = [f"--{form}={tmp_path / form}" for form in FORMS]
     code = status(["compare", str(tmp_path / "old"), str(tmp_path / "new"), *forms])
     assert code == FAILED and not STEERING.search(capsys.readouterr().out)
-    suites = ET.parse(tmp_path / "junit")
-    assert len(suites.findall(".//failure")) == len(HOSTILE)
+    assert len(ET.parse(tmp_path / "junit").findall(".//failure")) == len(HOSTILE)
     texts = {form: (tmp_path / form).read_text() for form in FORMS}
     assert not STEERING.search("".join(texts.values()))
     assert not ACTIVE.search(texts["html"]) and "<script>" not in texts["markdown"]

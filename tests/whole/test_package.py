@@ -234,9 +234,8 @@ def test_wheel_and_archive_install_on_every_python(tmp_path):
         "tests/conftest.py",
         "models/thesis.toml",
     } <= inner
-    here = f"{sys.version_info.major}.{sys.version_info.minor}"
     pythons = {version: shutil.which(f"python{version}") for version in PYTHONS} | {
-        here: sys.executable
+        f"{sys.version_info.major}.{sys.version_info.minor}": sys.executable
     }
     for version, python in pythons.items():
         if python and run_line([python, "--version"]).returncode == 0:

@@ -167,8 +167,7 @@ def test_a_new_parallelogram_is_one_over_the_whole_turn(ask):
     rows = list_columns(ask("analyze", "tp.toml", "--columns", "theta_2,torque"))
     assert len(rows) == 361
     for theta_2, torque in rows:
-        right = 0.3924 * np.cos(np.radians(theta_2))
-        assert torque == approx(right, abs=2e-6), theta_2
+        assert torque == approx(0.3924 * np.cos(np.radians(theta_2)), abs=2e-6), theta_2
 
 
 COUPLE = """\

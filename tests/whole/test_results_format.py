@@ -43,8 +43,7 @@ def results(tmp_path_factory):
     with MonkeyPatch.context() as monkeypatch:
         judge_here(monkeypatch)
         suite = Random(8, 1, tuple(DrawnType))
-        plan = Plan(suite, choose_engines("free-body"), workers=1, drawn=False)
-        run(plan, out)
+        run(Plan(suite, choose_engines("free-body"), workers=1, drawn=False), out)
     return out
 
 

@@ -111,8 +111,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
 
 @mark.slow
 def test_a_free_motion_has_time_and_no_drive(show):
-    released = Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))
-    save(crank_rocker(motion=released), "scene.toml")
+    save(crank_rocker(motion=Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "scene.toml")
     document = strict(show("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
@@ -280,8 +279,7 @@ def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(
     scene = crank_rocker(motion=Motion(Sweep(0.3, 1.2, 9), 1.0), drive=drive)
     stroke = solve(scene).stroke[4]
     save(scene, tmp_path / "cylinder.toml")
-    at = f"stroke={stroke:.17g} m"
-    out = show("analyze", tmp_path / "cylinder.toml", "--at", at)
+    out = show("analyze", tmp_path / "cylinder.toml", "--at", f"stroke={stroke:.17g} m")
     assert f"at theta_2 = {degrees(0.7):.6g} deg" in out
 
 

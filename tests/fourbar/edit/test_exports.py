@@ -43,12 +43,10 @@ def load_coarse(name):
 def test_at_rest_the_headline_has_the_numbers_of_analyze(name):
     scene = load_coarse(name)
     block = read_block(solve(scene), COMMON)
-    headline = evaluate_scene(scene, COMMON, settled=True)["headline"]
-    drive, pins, _ = headline.split("; ")
+    drive, pins, _ = evaluate_scene(scene, COMMON, settled=True)["headline"].split("; ")
     peak = re.sub(r"^peak (torque|drive force) ", "", drive)
     assert re.search(rf"(torque|force) +peak -?{re.escape(peak)} at", block), drive
-    load = re.fullmatch(r"largest pin force (\S+ \S+) at \w\d?", pins)
-    assert load[1] in block, pins
+    assert re.fullmatch(r"largest pin force (\S+ \S+) at \w\d?", pins)[1] in block, pins
 
 
 def test_the_headline_says_that_dry_friction_at_rest_is_left_out():
@@ -61,8 +59,7 @@ def test_the_headline_says_that_dry_friction_at_rest_is_left_out():
     slow_but({"thesis"}, UNBOUNDED),
 )
 def test_what_grows_without_bound_is_no_number(name):
-    scene = fourbar.load(MODELS / f"{name}.toml")
-    data = evaluate_scene(scene, COMMON, settled=True)
+    data = evaluate_scene(fourbar.load(MODELS / f"{name}.toml"), COMMON, settled=True)
     drive, pins, _ = data["headline"].split("; ")
     assert re.fullmatch("peak (torque|drive force) grows without bound", drive)
     assert re.match("largest pin force grows without bound at O2", pins)
@@ -75,7 +72,6 @@ def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
     scene = fourbar.load(MODELS / "capabilities/parallelogram.toml")
     gravity_only = replace(scene, effects=(), loads=())
-    peaks = evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]
-    assert peaks["torque"] == 0.0
+    assert evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]["torque"] == 0.0
     headline = evaluate_scene(gravity_only, COMMON)["headline"]
     assert headline.startswith("peak torque at least 0 N m; ")

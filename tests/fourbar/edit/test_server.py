@@ -246,8 +246,7 @@ def test_error_bars_follow_and_every_page_sees_the_change(bench):
             assert "  torque   peak" in "".join(about["data"]["summary"])
         assert "refused" in await told(second_page, set_input("9 ft"))
 
-    session = bench(ask)
-    assert session.state_file.exists()  # it is not saved
+    assert bench(ask).state_file.exists()  # it is not saved
 
 
 @mark.slow
@@ -396,8 +395,7 @@ def test_the_picture_is_served_as_an_image_alone(bench, path):
     async def ask(made, address):
         assert await status(address + "picture") == 404
         path.write_text(path.read_text() + '[picture]\nfile = "a.svg"\n')
-        line = await page(address)
-        await told(line, {"do": "text", "text": path.read_text()})
+        await told(await page(address), {"do": "text", "text": path.read_text()})
         assert await status(address + "picture") == 404
         path.with_name("a.svg").write_text("<svg><script/></svg>")
         answer = await fetch(address + "picture")

@@ -532,16 +532,14 @@ def unpacked(data):
     about, place = json.loads(data[4 : 4 + long]), 4 + long
     for sign, name, count, vector in about["columns"]:
         array = np.frombuffer(data, "<f8", count * vector, place)
-        column = array.reshape(count, vector).squeeze()
-        about["data"]["branches"][sign][name] = column
+        about["data"]["branches"][sign][name] = array.reshape(count, vector).squeeze()
         place += 8 * count * vector
     assert place == len(data)
     return about
 
 
 def settled(session):
-    now = session.now
-    evaluated = evaluate_scene(now.scene, session.units, settled=True)
+    evaluated = evaluate_scene(session.now.scene, session.units, settled=True)
     return session.describe(evaluated, settled=True)
 
 
@@ -572,8 +570,7 @@ def test_what_is_compared_is_the_peak_of_the_same_positions(session, stated):
 
 @mark.parametrize("path", SHOWN, ids=lambda path: path.stem)
 def test_every_linkage_that_people_know_has_an_answer(tmp_path, path):
-    told = Session(path, tmp_path / "exports").answer()
-    assert unpacked(pack_frame(told))["columns"]
+    assert unpacked(pack_frame(Session(path, tmp_path / "exports").answer()))["columns"]
 
 
 @mark.slow

@@ -42,8 +42,7 @@ beyond.
 
 
 def ends(start_bar, end_bar):
-    start = Place(start_bar, (0.17, -1.1))
-    return LinearDrive(start, Place(end_bar, (0.09, 0.7)))
+    return LinearDrive(Place(start_bar, (0.17, -1.1)), Place(end_bar, (0.09, 0.7)))
 
 
 @mark.parametrize("start_bar, end_bar", PAIRS)

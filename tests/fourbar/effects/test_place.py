@@ -27,8 +27,7 @@ def test_a_weight_hung_at_the_tip_of_the_rocker():
 
 
 def test_a_pull_at_the_tip_of_massless_bars():
-    torque = solve(loads(PULL)).torque
-    assert torque[0] == approx(1.656231, abs=PRINTED)
+    assert solve(loads(PULL)).torque[0] == approx(1.656231, abs=PRINTED)
 
 
 @mark.parametrize(

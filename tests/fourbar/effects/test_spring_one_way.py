@@ -70,8 +70,7 @@ def close(theta):
     to_O4 = 0.06 - A
     d = abs(to_O4)
     along = (0.07**2 - 0.055**2 + d * d) / (2.0 * d)
-    across = sqrt(0.07**2 - along**2)
-    return A, A + (along + 1j * across) * to_O4 / d
+    return A, A + (along + 1j * sqrt(0.07**2 - along**2)) * to_O4 / d
 
 
 def energy_of_door(theta):
@@ -104,8 +103,7 @@ def test_the_door_is_held_by_what_its_energy_asks():
     s = solve(scene)
     step = 1e-5
     ahead, behind = ([*map(energy_of_door, s.theta_2 + h)] for h in (step, -step))
-    right = np.subtract(ahead, behind) / (2.0 * step)
-    assert_allclose(s.torque, right, rtol=SLOPES)
+    assert_allclose(s.torque, np.subtract(ahead, behind) / (2.0 * step), rtol=SLOPES)
     fastened = solve(make_door('theta_2 = "40 deg"\nomega_2 = "0 rad/s"', ""))
     assert s.torque[0] - fastened.torque[0] == approx(0.0265373, abs=6e-8)
 
@@ -152,10 +150,9 @@ def test_where_its_ends_meet_a_spring_that_only_pulls_is_off():
 
 def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     """The distance of the ends is 2 r sin(half the angle between them)."""
-    off = 0.2 * sin(0.5)
     scene = crank_rocker(
         motion=Motion([1.4, 1.7, 2.0], 0.0),
-        effects=(Springs((Spring(*ENDS, 200.0, off, acts="pull"),)),),
+        effects=(Springs((Spring(*ENDS, 200.0, 0.2 * sin(0.5), acts="pull"),)),),
     )
     slopes = sensitivity(scene)
     assert slopes.status == ["ok", "at_free_length", "ok"]

@@ -66,8 +66,7 @@ def test_a_flywheel_alone_turns_evenly_faster_under_a_constant_couple(bar):
     s = solve(Scene(linkage), "position", at=m.command)
     start = solve(Scene(linkage, Motion(0.3, 1.0)), "velocity")
     angle, speed = {2: (s.theta_2, 1.0), 4: (s.theta_4, start.omega_4[0])}[bar]
-    turned = speed * times + 0.2 * times**2
-    assert angle - angle[0] == approx(turned, abs=1e-11)
+    assert angle - angle[0] == approx(speed * times + 0.2 * times**2, abs=1e-11)
 
 
 def test_a_motion_that_has_stopped_is_handed_to_another_process():
@@ -201,8 +200,7 @@ def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
     linkage, times = bare(*CRANK_ROCKER_LENGTHS), np.linspace(0.0, 1.0, 11)
     effects = [Flywheel(0.5), Friction.at(O2=0.4)]
     m = integrate(linkage, effects, 0.3, 0.4 * sense, times)
-    left = np.maximum(0.4 - 0.8 * m.time, 0.0)
-    assert np.abs(m.omega_2 - sense * left).max() < 1e-9
+    assert np.abs(m.omega_2 - sense * np.maximum(0.4 - 0.8 * m.time, 0.0)).max() < 1e-9
 
 
 @mark.parametrize("speed", [20.0, -20.0])
@@ -224,8 +222,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
     """
     linkage = bare(*PARALLELOGRAM, 0.2)
     for speed in (10.0, -10.0):
-        scene = let_go(0.5, speed, 1.5, 6, Flywheel(0.3), linkage=linkage)
-        released = release(scene)
+        released = release(let_go(0.5, speed, 1.5, 6, Flywheel(0.3), linkage=linkage))
         turned = 0.5 - 0.2 if speed < 0.0 else pi - (0.5 - 0.2)
         right = [(turned + k * pi) / 10.0 for k in range(5)]
         right = [t for t in right if t < 1.5]
@@ -237,8 +234,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
 @mark.slow
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = Torsion.at(O2=(0.01, 0.5, 0.0))
-    still = let_go(0.5, 1.0, 0.2, 4, DOWN, spring)
-    assert len(release(still).command.time) == 5
+    assert len(release(let_go(0.5, 1.0, 0.2, 4, DOWN, spring)).command.time) == 5
     wound = r"effects\.torsion: at 0.*more than half a turn"
     with raises(LimitError, match=wound):
         release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))

@@ -335,8 +335,7 @@ def test_a_parallelogram_drawn_on_a_grid_is_one():
         pins = (O2, O2 + arm, O2 + arm + base, O2 + base)
         scene = loads(write_pins(pins))
         tried += 1
-        coupler = approx(scene.linkage.coupler.length, rel=1e-14)
-        assert scene.linkage.ground == coupler
+        assert scene.linkage.ground == approx(scene.linkage.coupler.length, rel=1e-14)
         assert loads(dump(scene)).linkage == scene.linkage
     assert tried > 150
 
@@ -388,6 +387,5 @@ def test_a_commanded_bar_that_stands_still_as_drawn_is_refused(bar):
     with refused("stands still: command another bar"):
         loads(text)
     other = 6 - bar
-    scene = loads(text.replace(f"_{bar} =", f"_{other} ="))
-    here = solve(scene)
+    here = solve(loads(text.replace(f"_{bar} =", f"_{other} =")))
     assert here[f"omega_{bar}"][0] == 0.0

@@ -160,8 +160,7 @@ def test_its_numbers_vary_by_their_keys(scene):
         assert read_number(scene, of_magnets[key]) == approx(float(value), rel=1e-15)
         assert of_magnets[key].unit == find_unit_of_key(key) == unit
     key = "effects.magnets.rows.1.pull"
-    study = vary(scene, {key: [3.0, 4.0, 6.0]})
-    three, four, six = solve(study).torque.ravel()
+    three, four, six = solve(vary(scene, {key: [3.0, 4.0, 6.0]})).torque.ravel()
     assert three == solve(scene).torque != four
     assert six - four == approx(2.0 * (four - three), rel=1e-12)
 

@@ -198,8 +198,7 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
         assert decided[n][[1, 4]].tolist() == exact
         kept = [np.delete(values[n], [1, 4]) for values in (decided, half)]
         assert np.array_equal(*kept)
-        close = abs(decided[n] - half[n]).max()
-        assert (close > 1e-6) == (offset is not None)
+        assert (abs(decided[n] - half[n]).max() > 1e-6) == (offset is not None)
 
 
 def test_the_power_of_two_above_a_number():

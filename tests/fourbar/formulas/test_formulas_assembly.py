@@ -39,8 +39,7 @@ def test_an_assembly_goes_on_smoothly_through_change_points(name, lengths, bar):
     turns = STEP * np.arange(round(3 * 2 * pi / STEP))
     for q, branch in itertools.product((first + turns, first - turns), (1, -1)):
         rates = {f"theta_{bar}": q, f"omega_{bar}": 1.0}
-        motion = Motion(**rates, branch=branch)
-        ours = solve(Scene(linkage, motion), "velocity")
+        ours = solve(Scene(linkage, Motion(**rates, branch=branch)), "velocity")
         d, a, b, c = linkage.lengths
         u2, u3, u4 = (np.exp(1j * ours[f"theta_{number}"]) for number in (2, 3, 4))
         gap = a * u2 + b * u3 - d * np.exp(1j * GROUND_ANGLE) - c * u4

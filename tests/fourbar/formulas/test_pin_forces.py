@@ -57,8 +57,7 @@ def test_a_force_beside_B_has_its_moment_there(beside):
     coupler = Bar(b, centre=(0.0, 0.0))
     link = replace(bare(0.3, 0.1, b, 0.22), coupler=coupler)
     load = Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
-    motion = Motion(np.linspace(0.1, 6.0, 7), 0.0)
-    s = solve(Scene(link, motion, 4, (load,)))
+    s = solve(Scene(link, Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,)))
     arm = (b + beside) - b  # exact: as the doubles have it
     exact = arm * math.sin(direction) / (b * np.abs(np.sin(s.theta_3 - s.theta_2)))
     assert np.hypot(*s.F32.T) == approx(exact, rel=GROWN)
@@ -98,8 +97,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     """With the couples mu r |F| as loads the forces are the same."""
     friction = PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
     angles = np.linspace(0.1, 6.0, 13)
-    motion = Motion(angles, 10.0)
-    case = crank_rocker(motion=motion, drive_bar=drive_bar, loads=())
+    case = crank_rocker(motion=Motion(angles, 10.0), drive_bar=drive_bar, loads=())
     s = solve(replace(case, effects=(Gravity(), friction)))
     largest = max(np.hypot(*s[name].T).max() for name in PIN_FORCE.values())
     assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest
@@ -118,5 +116,4 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     given = solve(vary(one, {**moments, "motion.theta_2": angles[:, None]}))
     allowed = GROWN * largest / s.drive_condition
     for name in (*PIN_FORCE.values(), "torque"):
-        apart = np.abs(s[name] - given[name][:, 0])
-        assert (allowed >= apart.T).all(), name
+        assert (allowed >= np.abs(s[name] - given[name][:, 0]).T).all(), name

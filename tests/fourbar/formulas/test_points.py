@@ -135,8 +135,7 @@ def test_symmetric_circuits_draw_mirror_images():
     first, second = (coupler_curve(bars, 0.5, 0.0, circuit) for circuit in (0, 1))
     assert (first.y > 0.0).mean() > 0.5 > (second.y > 0.0).mean()
     for n in (10, 200):
-        apart = np.hypot(second.x - first.x[n], second.y + first.y[n])
-        assert apart.min() < 1e-12
+        assert np.hypot(second.x - first.x[n], second.y + first.y[n]).min() < 1e-12
 
 
 def test_a_circuit_that_does_not_exist_is_refused():

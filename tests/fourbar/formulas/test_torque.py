@@ -39,8 +39,7 @@ def test_digits_are_kept_at_a_stated_distance_from_a_limit(seed, offset):
         drive, branch = 2 + number % 3, 1 - 2 * (number // 2 % 2)
         assembled = []
         for side in (offset, -offset):
-            limit = FromLimit(number, side)
-            motion = Motion(limit, 1.3, 0.7, branch=branch)
+            motion = Motion(FromLimit(number, side), 1.3, 0.7, branch=branch)
             scene = Scene(linkage, motion, drive, loads, effects)
             s = solve(scene, "force")
             exact = answer_in_balls(scene).get("torque", [np.nan])[0]

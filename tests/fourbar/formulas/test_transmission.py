@@ -56,7 +56,6 @@ def test_extremes_are_those_of_a_scan():
             # it is the angle of a position
             assert 0.0 <= theta_2 - theta_1 <= pi * (1.0 + EPS) + 2.0 * EPS
             e = abs(a * np.exp(1j * theta_2) - d * np.exp(1j * theta_1))
-            by_cosines = b * b + c * c - 2 * b * c * cos(end)
-            assert e**2 == approx(by_cosines, abs=64 * EPS)
+            assert e**2 == approx(b * b + c * c - 2 * b * c * cos(end), abs=64 * EPS)
         assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4

@@ -111,8 +111,7 @@ def test_the_file_opens_in_the_assembly_beyond_change_points(lengths, points, br
     turns = pi * np.add.outer(np.array(points.split(), float), [-2, 0, 2]).ravel()
     for psi in (-2.5, -0.5, 0.5, 2.5, 3.8, 6.0, 6.8):
         passed = sum((at > 0.5) != (at > psi) for at in turns)
-        motion = Motion(0.3 + psi, 5.0, branch=branch)
-        _, data = opened(Scene(linkage, motion))
+        _, data = opened(Scene(linkage, Motion(0.3 + psi, 5.0, branch=branch)))
         O4, A, B = (data.site(name).xpos[:2] for name in ("O4", "A", "B3"))
         left = np.cross([*(O4 - A), 0.0], [*(B - A), 0.0])[2]
         assert np.sign(left) == branch * (-1) ** passed, psi

@@ -68,8 +68,7 @@ def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):
     law = Law(tuple(t), **columns)
     between = np.linspace(0.0, 1.5, 50)
     for order, computed in enumerate(law.at(between)):
-        right = wanted.deriv(order)(between)
-        assert_allclose(computed, right, atol=100.0 * EXACT)
+        assert_allclose(computed, wanted.deriv(order)(between), atol=100.0 * EXACT)
     scene = Scene(uniform(0.2, 0.3, 0.25, 0.28), Motion(law=law))
     text = dump(scene)
     assert loads(text).motion == scene.motion
@@ -189,8 +188,7 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)
     law, changed = (Law(times, angles, ends=name) for name in (ends, other))
     at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
-    bare = uniform(0.3, 0.1, 0.25, 0.22)
-    scene = Scene(bare, Motion(law=law), effects=(Gravity(),))
+    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law), effects=(Gravity(),))
     printed = read_block(solve(scene, "error"))
     assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
     rates = (one.at(at_ends) for one in (law, changed))

@@ -37,9 +37,8 @@ GROUND = Place(1, (0.3, 2.2))
 
 
 def scene(bar, stroke, side="left", **motion):
-    commanded = Motion(stroke=stroke, side=side, **motion)
     return crank_rocker(
-        motion=commanded,
+        motion=Motion(stroke=stroke, side=side, **motion),
         drive=LinearDrive(GROUND, ENDS[bar]),
         effects=(fourbar.Gravity(),),
     )
@@ -47,8 +46,7 @@ def scene(bar, stroke, side="left", **motion):
 
 def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end():
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        s = solve(scene(2, 0.3, side))
-        end = 0.12 * np.exp(1j * (s.theta_2[0] + 0.4))
+        end = 0.12 * np.exp(1j * (solve(scene(2, 0.3, side)).theta_2[0] + 0.4))
         ground = 0.3 * np.exp(1j * (2.2 + crank_rocker().linkage.ground_angle))
         assert sign * (np.conj(ground) * end).imag > 0.0
 
@@ -136,8 +134,7 @@ def test_who_does_not_take_it_says_so():
     ],
 )
 def test_a_sweep_of_texts_is_read_by_the_unit_that_they_state(keywords, words):
-    sweep = Sweep("10 cm", "0.2 m", 4)
-    motion = Motion(stroke=sweep, side="left")
+    motion = Motion(stroke=Sweep("10 cm", "0.2 m", 4), side="left")
     assert motion.angle == Sweep(0.1, 0.2, 4)
     with refused(words):
         Motion(**keywords)

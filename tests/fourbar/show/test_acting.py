@@ -219,8 +219,7 @@ drawn | 530 deg |
 def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told):
     """The input is drawn at 170 deg, or at -190 deg, to a ground at 180 deg."""
     text = DRAWN.replace("FROM", start).replace("TO", stop)
-    across = 98.0 * tan(radians(10.0))
-    scene = loads(text.replace("ACROSS", repr(across)))
+    scene = loads(text.replace("ACROSS", repr(98.0 * tan(radians(10.0)))))
     (note,) = list_drawn_notes(scene, DEGREES) or [""]
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
@@ -232,8 +231,7 @@ ENDS = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
 @mark.parametrize("start, stop", [(2.0, 2.0 + tau), (8.0, 2.0)])
 def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
-    length = sqrt(0.1 - 0.06 * cos(pi - 0.2))
-    springs = Springs((Spring(*ENDS, 1.0, length),))
+    springs = Springs((Spring(*ENDS, 1.0, sqrt(0.1 - 0.06 * cos(pi - 0.2))),))
     scene = Scene(MASSLESS, Motion(Sweep(start, stop, 1), 1.0), effects=(springs,))
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     places = [f"theta_2 = {degrees(pi + x):.4g} deg" for x in (-0.2, 0.2)]
@@ -251,8 +249,7 @@ def test_a_spring_pulls_in_a_release_from_between_its_instants():
         Torsion.at(O2=(1.0, 1.0, 0.0)),
         Springs((Spring(*ENDS, 1e-12, length),)),
     )
-    motion = Motion(0.5, 0.0, free=Free(0.3, 3))
-    scene = Scene(MASSLESS, motion, effects=effects)
+    scene = Scene(MASSLESS, Motion(0.5, 0.0, free=Free(0.3, 3)), effects=effects)
     time = 1e3 * acos(-0.2) / 10.0
     (note,) = list_spring_notes(scene, solve(scene), DEGREES)
     assert f"pulls from t = {time:.4g} ms on" in note

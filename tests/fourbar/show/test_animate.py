@@ -84,8 +84,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
     data = embedded(animate.write_page(thesis(theta_2)))
     row = data["start"]
     assert data["theta_2"][row] == theta_2 and len(data["theta_2"]) > 300
-    torque = data["branches"]["1"]["torque"][row]
-    assert torque == solve(thesis(theta_2)).torque[0]
+    assert data["branches"]["1"]["torque"][row] == solve(thesis(theta_2)).torque[0]
 
 
 def test_a_single_position_has_the_angles_of_its_solution():
@@ -109,8 +108,7 @@ antiparallelogram | 18 | alpha_3
 @mark.parametrize("model, row, name", ROUNDING)
 def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
     scene = load(MODELS / f"capabilities/{model}.toml")
-    columns = animate.collect_live_data(scene)["branches"][str(scene.motion.branch)]
-    shown = columns[name]
+    shown = animate.collect_live_data(scene)["branches"][str(scene.motion.branch)][name]
     solved = getattr(solve(scene), name)
     assert_allclose(shown, solved, atol=1e-12)
     here = int(row)

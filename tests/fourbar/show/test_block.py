@@ -455,16 +455,14 @@ def test_the_block_says(name):
 
 
 def test_the_head_of_one_listed_position_has_its_own_rates():
-    listed = Motion([0.2, 1.4], [0.0, 9.0], [3.0, -1.0])
-    scene = crank_rocker(motion=listed)
+    scene = crank_rocker(motion=Motion([0.2, 1.4], [0.0, 9.0], [3.0, -1.0]))
     text = read_block(solve(scene, at=command(scene).part([0])))
     assert "drive on the input, at rest, alpha_2 = 3 rad/s²" in text
     assert "at rest" not in block(scene) and "-1 rad/s² to 3" in block(scene)
 
 
 def test_the_block_has_the_numbers_of_the_facts():
-    scene = crank_rocker(motion=turn(360))
-    facts = Facts(solve(scene, "error"))
+    facts = Facts(solve(crank_rocker(motion=turn(360)), "error"))
     text = "\n".join(SceneBlock(facts.solution).write())
     duty = facts.duty
     peak = facts.peak
@@ -720,8 +718,7 @@ def test_a_cylinder_assembles_over_the_range_that_its_bar_is_in(number):
 @mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
 def test_digits_left_are_those_that_the_error_bar_leaves(away):
     """A torque on bar 4 beside its dead centre, where bars 2 and 3 are in line."""
-    stretched = find_angle(0.22, 0.3, 0.35)
-    motion = {"theta_2": stretched + away, "omega_2": 3.0}
+    motion = {"theta_2": find_angle(0.22, 0.3, 0.35) + away, "omega_2": 3.0}
     scene = replace(move(CRANK_ROCKER_LENGTHS, WEIGHT, **motion), drive_bar=4)
     s = solve(scene, "error")
     digits = floor(log10(abs(s.torque[0]) / s.torque_error[0]))
@@ -732,8 +729,7 @@ def test_digits_left_are_those_that_the_error_bar_leaves(away):
 
 def test_a_spring_that_the_cylinder_holds_end_to_end_loads_no_pin():
     """Massless bars, and both ends in common: what is left at the pins is rounding."""
-    spring = Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5)
-    effects = (Springs((spring,)),)
+    effects = (Springs((Spring(CYLINDER.start, CYLINDER.end, 1e5, 0.5),)),)
     scene = Scene(
         MASSLESS, Motion([0.1, 0.4, 0.7], 1.0), drive=CYLINDER, effects=effects
     )
@@ -748,8 +744,7 @@ def test_a_cell_that_is_rounding_of_its_column_is_zero_without_a_sign():
     values = np.array([0.0392, -1.7e-16, -0.0, np.nan, 0.02])
     assert write_cells(values) == ["0.0392", "0", "0", "-", "0.02"]
     assert write_cells(np.array([12.0, -1e-5, 30.0]), ".4f")[1] == "0.0000"
-    beside_a_pole = np.array([10.0] * 99 + [1e15])
-    assert write_cells(beside_a_pole)[0] == "10"
+    assert write_cells(np.array([10.0] * 99 + [1e15]))[0] == "10"
 
 
 @mark.parametrize("name, branch", (("open", 1), ("crossed", -1)))

@@ -54,8 +54,7 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     torque, ratio = choose_columns(s, "torque/F12,F12/F14")
     assert ratio.values == approx(np.hypot(*s.F12.T) / np.hypot(*s.F14.T))
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
-    shown = torque.shown({"N m": ("N mm", 1e3)})
-    assert shown == approx(1e3 * torque.values)
+    assert torque.shown({"N m": ("N mm", 1e3)}) == approx(1e3 * torque.values)
 
 
 UNKNOWN = read_rows("""
@@ -113,8 +112,7 @@ def test_a_difference_of_angles_goes_on_from_its_first_position():
     theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.
     """
     start = 2.0 * np.pi + 5.0
-    motion = Motion(Sweep(start, start + 2.0 * tau, 100), 10.0)
-    scene = replace(TURN, motion=motion)
+    scene = replace(TURN, motion=Motion(Sweep(start, start + 2.0 * tau, 100), 10.0))
     solution = solve(scene)
     (difference,) = columns(scene, "theta_2 - theta_4").values()
     assert -np.pi < difference[0] <= np.pi
@@ -151,9 +149,7 @@ def test_ratios_and_centres_are_those_of_the_formulas(speed):
 def test_what_has_no_value_is_a_dash_and_what_is_rounding_zero():
     """Bars 2 and 4 are parallel: I13 lies at infinity, and the weight pulls down."""
     motion = Motion(np.array([1.0, 2.0]), 0.0)
-    linkage = uniform(3.0, 1.0, 3.0, 1.0)
-    scene = Scene(linkage, motion, effects=(Gravity(),))
-    s = solve(scene)
+    s = solve(Scene(uniform(3.0, 1.0, 3.0, 1.0), motion, effects=(Gravity(),)))
     assert np.isnan(derive(s, "I13")).all()
     assert derive(s, "omega_4/omega_2") == approx(1.0)
     assert " - " in print_positions(s, None, DEGREES)
@@ -166,8 +162,7 @@ def test_csv_has_every_derived_quantity():
     s = solve(TURN)
     header, first = (line.split(",") for line in s.to_csv().splitlines()[:2])
     row = dict(zip(header, first, strict=True))
-    on_frame = -(s.F12 + s.F14)[0, 0]
-    assert float(row["shaking_force_x"]) == approx(on_frame, rel=1e-12)
+    assert float(row["shaking_force_x"]) == approx(-(s.F12 + s.F14)[0, 0], rel=1e-12)
     assert float(row["omega_4/omega_2"]) == s.omega_4[0] / s.omega_2[0]
     assert float(row["time"]) == 0.0
     for quantity in DERIVED_QUANTITIES:

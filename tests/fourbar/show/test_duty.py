@@ -115,8 +115,7 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
     couple = fourbar.Load(2, moment=-0.7)
     scene = Scene(linkage, motion, loads=(couple,), effects=(Gravity(),))
     duty = motor_duty(solve(scene))
-    sense = copysign(1.0, speed)
-    turned = sense * abs(stop - start)
+    turned = copysign(1.0, speed) * abs(stop - start)
     first, last = (start, stop) if turned * (stop - start) > 0.0 else (stop, start)
     lifted = 2.0 * 9.81 * 0.1 * (sin(last) - sin(first))
     given = duty.energy_in - duty.energy_out
@@ -180,8 +179,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = Torsion.at(A=(2.0, radians(86.0), 0.0))
-    turn = Sweep(0.0, tau, 120)
-    scene = crank_rocker(motion=Motion(turn, 1.0), effects=(torsion,))
+    scene = crank_rocker(motion=Motion(Sweep(0.0, tau, 120), 1.0), effects=(torsion,))
     duty = motor_duty(solve(scene))
     assert duty.closed
     assert (duty.energy_in, duty.energy_out, duty.energy_swing) == (None, None, None)

@@ -94,8 +94,7 @@ def parallelogram(motion=SWEEP):
 )
 def test_every_position_with_a_value_is_located(name, value, places, motion):
     """By cosines; two of one step of the sweep too, in the order of the motion."""
-    found = locate(parallelogram(motion), name, value).places
-    assert found == approx(
+    assert locate(parallelogram(motion), name, value).places == approx(
         places if '"0 deg", to' in motion else places[::-1], abs=LOCATED
     )
 
@@ -188,8 +187,7 @@ def test_a_law_passes_an_angle_up_and_down():
     assert len(found.angle) == 3
     assert found.angle[:2] == approx(1.5, abs=LOCATED)
     assert found.time[0] < 1.0 < found.time[1] and found.time[2] == 0.5
-    begins = locate(LAW, "theta_2", "0.3 rad")
-    assert begins.time[0] == 0.0
+    assert locate(LAW, "theta_2", "0.3 rad").time[0] == 0.0
 
 
 def test_a_knot_of_a_law_is_one_place():
@@ -208,8 +206,7 @@ def test_a_release_is_met_when_it_first_passes():
     wanted = ("time", "0 s"), ("time", "0.25 s"), ("theta_2", f"{value!r} rad")
     found = [locate(DROPPED, *at) for at in wanted]
     begin, there, passing = found[0], found[1], found[2].part(slice(0, 1))
-    passes = np.diff(np.sign(fine.theta_2 - value)) != 0
-    first = int(np.flatnonzero(passes)[0])
+    first = int(np.flatnonzero(np.diff(np.sign(fine.theta_2 - value)) != 0)[0])
     assert begin.angle == approx([1.0]) and passing.angle == approx([value], abs=1e-9)
     assert [*begin.time, *there.time] == approx([0.0, 0.25])
     assert passing.time == approx([fine.time[first]], abs=fine.time[1] * (1.0 + 1e-6))

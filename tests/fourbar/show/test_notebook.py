@@ -86,8 +86,7 @@ def test_results_say_in_ten_lines_what_they_hold(result):
 def test_a_solution_says_how_many_positions_it_has():
     assert "evaluated: theta_2, " in repr(solve(LOOSE))
     assert "status: 122 ok, 61 not_assembled" in repr(solve(STUDY))
-    single = replace(LOOSE, motion=Motion(1.0))
-    one = solve(vary(single, {"lengths.input": 0.1}))
+    one = solve(vary(replace(LOOSE, motion=Motion(1.0)), {"lengths.input": 0.1}))
     for shown in (repr(one), one._repr_html_()):
         assert "1 linkage, 1 position each" in shown
 

@@ -61,8 +61,7 @@ class Page:
         return [number(self[name].text) for name in names]
 
     def print(self):
-        media = {"media": "print"}
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
 
     def pins(self):
         """The pins as drawn, in lengths of the ground from O2 and in its axes."""
@@ -184,8 +183,7 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
 
 @mark.slow
 def test_an_input_that_turns_fully_goes_round(show):
-    page = show(crank_rocker())
-    rows = page.play(241)  # 12 s: two sweeps
+    rows = show(crank_rocker()).play(241)  # 12 s: two sweeps
     assert set(range(60)) <= set(rows) <= set(range(61))
     assert sum(np.diff(rows) < 0) == 2
 
@@ -305,8 +303,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     """
     acting = dict(page.run(script))
     assert acting.keys() >= {"act act-drive", "act act-gravity"}
-    along = np.array([cos(theta_4), sin(theta_4)])
-    end = s.B[20] + (0.08 - 0.22) * along
+    end = s.B[20] + (0.08 - 0.22) * np.array([cos(theta_4), sin(theta_4)])
     assert_allclose(acting["act act-spring"][-1], end, atol=1e-4)
     tail, tip = np.array(acting["act act-force"])
     off = 0.03 * np.array([cos(theta_3 + 1.0), sin(theta_3 + 1.0)])
@@ -318,8 +315,7 @@ def test_what_acts_is_drawn_at_its_place_and_dimensions_on_request(show):
     moving = ("v_A", "v_G3", "a_A", "a_G3")
     for (start, stop), name in zip(arrows[[0, 3, 5, 8]], moving, strict=True):
         x, y = stop - start
-        expected = s[name][20]
-        assert atan2(-y, x) == approx(atan2(*expected[::-1]), abs=0.001), name
+        assert atan2(-y, x) == approx(atan2(*s[name][20][::-1]), abs=0.001), name
     script = "['1', '3'].map(k => parts.label[k])"
     texts = script + ".map(e => e.textContent)"
     assert page.state(texts) == ["1", "3"]
@@ -434,8 +430,7 @@ def test_at_360_pixels_nothing_sticks_out_and_all_text_is_readable(show, scene, 
 
 def luminance(colour):
     parts = np.array(re.findall(r"\d+", colour)[:3], dtype=float) / 255
-    curved = ((parts + 0.055) / 1.055) ** 2.4
-    linear = np.where(parts <= 0.03928, parts / 12.92, curved)
+    linear = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
     return linear @ [0.2126, 0.7152, 0.0722]
 
 
@@ -508,8 +503,7 @@ def test_with_reduced_motion_it_moves_twice_a_second(show):
 
 
 def test_positions_alone_show_no_dynamics(show):
-    scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36)))
-    page = show(scene)
+    page = show(crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36))))
     assert not page["forces"].is_displayed()
     assert page["omega_3"].text == "–"
     page["forward"].click()
@@ -532,8 +526,7 @@ def test_it_says_why_a_position_has_no_forces(show):
     motion = Motion(Sweep(0.3, 2.0, 4), 1.0)
     remark = "no torque of the drive holds them in balance"
     for drive_bar in (3, 2):
-        scene = Scene(uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar)
-        status = show(scene)["status"]
+        status = show(Scene(uniform(1.0, 0.5, 1.0, 0.5), motion, drive_bar))["status"]
         assert (remark in status.text) == status.is_displayed() == (drive_bar == 3)
 
 
@@ -597,10 +590,8 @@ def test_the_bars_of_the_sheet_have_the_units_of_its_heads(show):
 @mark.slow
 def test_a_printed_page_is_one_sheet_with_lengths_and_the_chart_s_name(show):
     page = show(crank_rocker(), dark=True)
-    options = {"printBackground": True}
-    printed = page.driver.execute_cdp_cmd("Page.printToPDF", options)
-    pdf = base64.b64decode(printed["data"])
-    assert pdf.count(b"/Type /Page\n") == 1
+    printed = page.driver.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
+    assert base64.b64decode(printed["data"]).count(b"/Type /Page\n") == 1
 
     page.print()
     page.run("window.dispatchEvent(new Event('beforeprint'))")

@@ -25,10 +25,8 @@ def fit(curve, edges=EDGES, wanted="integrated"):
 def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
     panels = fit(lambda x: np.where(x < place, 2.0, -1.0))
-    right = 2.0 * place - (2.0 - place)
-    assert panels.integrate("curve") == approx(right, abs=1e-8)
-    turns = panels.accumulate("curve")
-    assert turns.max() == approx(2.0 * place, rel=1e-8)
+    assert panels.integrate("curve") == approx(2.0 * place - (2.0 - place), abs=1e-8)
+    assert panels.accumulate("curve").max() == approx(2.0 * place, rel=1e-8)
     assert not panels.growing
 
 
@@ -45,8 +43,7 @@ def test_what_grows_without_bound_is_said_to_and_where(power):
     panels = fit_panels(compute, EDGES, wanted)
     assert panels.growing == {"curve"} and not panels.has_value("curve")
     assert panels.list_poles("curve") == [approx(POLE, abs=1e-7)]
-    right = exp(2.0) - 1.0
-    assert panels.integrate("other") == approx(right, rel=SETTLED)
+    assert panels.integrate("other") == approx(exp(2.0) - 1.0, rel=SETTLED)
 
 
 @mark.parametrize(

@@ -54,8 +54,7 @@ def numbers(line):
 )
 def test_what_a_scene_has_not_is_left_out(motion, rates):
     """A static position has no rates, and one without a speed no forces."""
-    still = replace(ONE, motion=motion, points=())
-    sheet = PositionSheet(solve(still), COMMON)
+    sheet = PositionSheet(solve(replace(ONE, motion=motion, points=())), COMMON)
     heading = sheet.write_bars()[0]
     assert "theta" in heading
     assert [name for name in ("omega", "alpha") if name in heading] == rates

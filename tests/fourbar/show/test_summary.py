@@ -145,8 +145,7 @@ def scan(scene, ends, *corners):
 )
 def test_facts_are_those_of_a_dense_scan(name):
     wholes = {"wiper": tomllib.loads(WIPER.read_text()), "nothing acts": {}}
-    whole = wholes.get(name, CRANK_ROCKER)
-    scene = scene_file.read_tables(whole | SCENES[name])
+    scene = scene_file.read_tables(wholes.get(name, CRANK_ROCKER) | SCENES[name])
     pin = REVERSES.get(name, "")
     solution = solve(scene)
     facts = Facts(solution)
@@ -205,8 +204,7 @@ def check_loads(facts, sizes, weights):
     for pin, force in PIN_FORCE.items():
         peak = panels.find_peak(force)
         rms = motion.find_rms(force)
-        right = sqrt(weights @ sizes[force] ** 2)
-        assert rms == approx(right, rel=EXACT, abs=1e-12)
+        assert rms == approx(sqrt(weights @ sizes[force] ** 2), rel=EXACT, abs=1e-12)
         theta_2 = motion.find_theta_2(peak.place)
         of_pin = {"peak": peak.value, "rms": rms, "theta_2": theta_2}
         assert of_pin.items() <= entry["pins"][pin].items()
@@ -224,8 +222,7 @@ def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones(
     def list_numbers(force):
         motion = Motion(Sweep(0.1, 0.1 + tau, 12), 10.0)
         load = Load(3, (force, 0.4), from_pin=(0.05, 0.0))
-        scene = Scene(bare(*CRANK_ROCKER_LENGTHS), motion, loads=(load,))
-        facts = Facts(solve(scene))
+        facts = Facts(solve(Scene(bare(*CRANK_ROCKER_LENGTHS), motion, loads=(load,))))
         duty = facts.duty
         torques = duty.peak_torque, duty.rms_torque, duty.energy_in
         of_pins = map(facts.motion.find_rms, PIN_FORCE.values())
@@ -300,8 +297,7 @@ def release_pendulum(omega, duration, *effects):
     """
     linkage = FourBar(0.6, CRANK, COUPLER, CRANK)
     motion = Motion(1.5 * pi - AWAY, omega, free=Free(duration, 7))
-    scene = Scene(linkage, motion, effects=(Gravity(9.8), *effects))
-    return Facts(solve(scene))
+    return Facts(solve(Scene(linkage, motion, effects=(Gravity(9.8), *effects))))
 
 
 @mark.slow

@@ -164,8 +164,7 @@ def test_a_crank_with_mass_alone_is_a_pendulum(name):
     found = sorted(equilibria.found, key=lambda rest: rest.stability)
     assert [rest.stability for rest in found] == [row[0] for row in expected]
     for rest, (stability, theta_2, slope, inertia) in zip(found, expected, strict=True):
-        turned = remainder(rest.place.theta_2 - theta_2, TURN)
-        assert turned == approx(0.0, abs=close)
+        assert remainder(rest.place.theta_2 - theta_2, TURN) == approx(0.0, abs=close)
         assert rest.inertia == approx(inertia, rel=CLOSE, abs=CLOSE)
         assert rest.slope == approx(slope, rel=max(CLOSE, 1e3 * close), abs=close)
         if stability == "stable" and inertia:
@@ -209,8 +208,7 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     assert len(equilibria.held) == 2
     assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
     Q = -FALLS * np.sin(equilibria.positions.theta_2)
-    moves = np.where(np.abs(Q) <= f, 0.0, np.sign(Q))
-    assert np.array_equal(equilibria.moves, moves)
+    assert np.array_equal(equilibria.moves, np.where(np.abs(Q) <= f, 0.0, np.sign(Q)))
     stuck = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
     assert not stuck.moves.any() and len(stuck.held) == 1
     assert all(rest.held for rest in stuck.found)
@@ -382,8 +380,7 @@ def test_what_a_sweep_does_not_reach_is_told_apart(branch):
     (rest,) = equilibria.found
     assert rest.place.branch == -1
     assert rest.reached == (branch == -1)
-    everywhere = equilibrium(springy_table(branch=branch)).found
-    assert all(rest.reached for rest in everywhere)
+    assert all(rest.reached for rest in equilibrium(springy_table(branch=branch)).found)
     if branch == 1:
         first, second, _ = write_equilibria("table", equilibria).split("\n\n")
         assert "0 equilibria in this sweep without friction," in first
@@ -401,8 +398,7 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
         swept = Motion(theta_4=Sweep(radians(low), radians(high), 977))
         s = solve(replace(scene, motion=swept), "position")
         assert s.assembled.all()
-        psi_and_mu = np.stack([s.theta_2, s.theta_4 - s.theta_3], axis=1)
-        places = curve.tau(psi_and_mu)
+        places = curve.tau(np.stack([s.theta_2, s.theta_4 - s.theta_3], axis=1))
         assert (curve.reached(places) == (low == 150.0)).all()
         assert low != 150.0 or {*np.sign(s.sin_mu)} == {1.0, -1.0}
 

@@ -64,8 +64,7 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     x = np.array([0.01, 0.06, 0.12, 0.2])
     internal = solved(Scene(BARE, AT, loads=(load,), points=(point,)), bar, x)
     length = BARE.bar(bar).length
-    M = 3.0 * (x / length - (x > foot))
-    assert_allclose(internal.M[0], M, atol=3.0 * ROUNDED)
+    assert_allclose(internal.M[0], 3.0 * (x / length - (x > foot)), atol=3.0 * ROUNDED)
     largest = 3.0 * max(foot, length - foot) / length
     assert abs(internal.largest.moment[0]) == approx(largest, rel=ROUNDED)
     assert internal.largest.x[0] == approx(foot, abs=ROUNDED)

@@ -70,8 +70,7 @@ def find_positions(scene, name, value):
     ],
 )
 def test_every_position_with_a_value_is_found_in_rising_order(scene, name):
-    solution = solve(scene, "position")
-    values = solution[name]
+    values = solve(scene, "position")[name]
     value = float(values[3:5].mean())
     found = find_positions(scene, name, value)
     solved = getattr(solve(scene, "position", at=found), name)
@@ -103,8 +102,7 @@ def test_at_a_limit_of_the_coupler_input_and_output_are_parallel():
     scene = Scene(bare(0.42, 0.6, 0.56, 0.45))
     ((_, limit),) = find_intervals(scene.linkage, 3)
     there = solve(scene, at=find_positions(scene, "theta_3", limit))
-    between = there.theta_4 - there.theta_2
-    assert np.sin(between) == approx([0.0], abs=AT_LIMIT)
+    assert np.sin(there.theta_4 - there.theta_2) == approx([0.0], abs=AT_LIMIT)
 
 
 def test_a_commanded_angle_out_of_range_is_refused_with_the_range():
@@ -154,8 +152,7 @@ def test_positions_are_counted_as_the_motion_that_enters_its_range(lengths, turn
     part = Table((low % (2.0 * pi), low % (2.0 * pi) + 0.3), (1.0, 1.0))
     load = Load(4, moment=1.0, table=part)
     scene = Scene(linkage, Motion(angles, 1.0), loads=(load,))
-    theta_4 = float(solve(scene, "position").theta_4[6])
-    found = find_positions(scene, "theta_4", theta_4)
+    found = find_positions(scene, "theta_4", float(solve(scene, "position").theta_4[6]))
     assert low + 0.2 == approx(found.angle[0], abs=1e-9)
     assert (found.angle < high).all()
 

@@ -21,8 +21,7 @@ def test_a_coupler_curve_of_a_scene_passes_through_its_point():
     path = solve(TURN).points["P"]
     away = np.hypot(curve.x[:, None] - path[:, 0], curve.y[:, None] - path[:, 1])
     assert away.min(axis=0).max() < 1e-4
-    crossed = recommand(TURN, branch=-1)
-    other = coupler_curve(solve(crossed), "P", steps=400)
+    other = coupler_curve(solve(recommand(TURN, branch=-1)), "P", steps=400)
     assert set(other.branch) == {-1} and set(curve.branch) == {1}
     with refused("must be a point of the coupler: P"):
         coupler_curve(TURN, "J")

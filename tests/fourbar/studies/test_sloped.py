@@ -109,15 +109,13 @@ class Drag(Effect):
 
     def act(self, actions, state):
         omega = state.omega(2)
-        square = self.strength * omega * omega
-        actions.couple(2, -getattr(np, self.form)(square, omega))
+        actions.couple(2, -getattr(np, self.form)(self.strength * omega * omega, omega))
 
 
 @mark.parametrize("speed", [-2.0, 2.0])
 def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     def dragged(form, speed):
-        motion = Motion(1.0, speed)
-        return crank_rocker(motion=motion, effects=(Drag(0.5, form),))
+        return crank_rocker(motion=Motion(1.0, speed), effects=(Drag(0.5, form),))
 
     by_speed = sensitivity(dragged("copysign", speed)).of("torque", "motion.omega_2")
     ahead, behind = (

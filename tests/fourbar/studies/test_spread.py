@@ -87,8 +87,7 @@ def test_friction_at_rest_moves_what_it_holds_and_no_torque():
 
 def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go():
     """Of n numbers the k-th is the quantile (k + 1/2)/n, within one of n."""
-    study = spread(Tolerance("lengths.output", 2e-5, True))
-    theta = study.spreads["theta_4"]
+    theta = spread(Tolerance("lengths.output", 2e-5, True)).spreads["theta_4"]
     for end in (theta.least, theta.greatest):
         sigmas = np.abs(end - theta.nominal) / theta.first_order
         assert (sigmas > norm.isf(1.0 / 2048)).all()
@@ -224,8 +223,7 @@ def test_samples_of_a_drawing_have_its_coordinates_and_units(tmp_path, show):
         assert nominal == drawn
         assert band == approx([drawn] * 4, abs=0.03)
         assert 0.001 < sigma < 0.02
-    above = printed[: printed.index("  theta_2")].splitlines()
-    assert max(map(len, above)) <= 80
+    assert max(map(len, printed[: printed.index("  theta_2")].splitlines())) <= 80
 
 
 def test_the_share_that_is_done_reaches_all_of_it():

@@ -155,8 +155,7 @@ def test_angles_of_its_own_for_each_member_and_arrays_to_write_into():
     assert solution.scene is None
     assert solution.torque is out["torque"] and solution.F12 is None
     for member, length in enumerate((0.1, 0.12)):
-        values = {"lengths.input": [length] * 2}
-        one = alone(study, values, 0)
+        one = alone(study, {"lengths.input": [length] * 2}, 0)
         single = solve(Scene(one.linkage, Motion(theta_2[member], 3.0, 0.5), 2, LOADS))
         assert_array_equal(out["torque"][member], single.torque)
         assert_array_equal(out["a_G3"][member], single.a_G3)

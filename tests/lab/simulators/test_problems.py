@@ -317,8 +317,7 @@ def make_result(name, **answers):
 
 def levels_of(name, **answers):
     """Return the levels of the right answers, some of which are others."""
-    judged = judge_answers(read_stored(name), make_result(name, **answers))
-    return find_levels(judged)
+    return find_levels(judge_answers(read_stored(name), make_result(name, **answers)))
 
 
 def spoil(error):

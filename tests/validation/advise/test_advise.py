@@ -88,20 +88,16 @@ def test_a_drive_elsewhere_is_judged_between_the_steps_too():
     miss 9 % between them.
     """
     scene = fourbar.load(MODELS / "drag_link.toml")
-    setup = JudgedSetup(scene)
-    trial = setup.try_out(advise.make_settings(14.0, 3.0))
-    at_steps = compute_errors(scene, trial.at, trial.quantities).worst
-    assert at_steps < 0.01
+    trial = JudgedSetup(scene).try_out(advise.make_settings(14.0, 3.0))
+    assert compute_errors(scene, trial.at, trial.quantities).worst < 0.01
     assert matters.judge_trial(scene, trial).worst > 0.05
 
 
 def test_no_curve_is_drawn_through_a_pole():
     """On the crank-rocker the torque of bar 4 has poles where the rocker reverses."""
     scene = replace(turning(), drive_bar=4)
-    setup = JudgedSetup(scene)
-    trial = setup.try_out(advise.make_settings(160.0, 20.0))
-    stretches = matters.split_at_poles(scene, trial.at)
-    assert len(stretches) == 3
+    trial = JudgedSetup(scene).try_out(advise.make_settings(160.0, 20.0))
+    assert len(matters.split_at_poles(scene, trial.at)) == 3
     assert matters.judge_trial(scene, trial).worst < 0.1
 
 
@@ -124,8 +120,7 @@ def test_the_file_alone_keeps_the_error(tmp_path, call):
     Reset to the keyframe and stepped for a revolution.
     """
     out = tmp_path / "out.xml"
-    scenes = {"scene": turning(positions=72)}
-    status, printed, _ = call(scenes, "1e-5", "-o", str(out))
+    status, printed, _ = call({"scene": turning(positions=72)}, "1e-5", "-o", str(out))
     assert status == 0, printed
     loop = ClosedLoop(out.read_text())
     mujoco.mj_resetDataKeyframe(loop.model, loop.data, 0)
@@ -174,8 +169,7 @@ def test_an_error_is_between_0_and_1(required):
 @mark.slow
 @mark.parametrize("required", [1e-3, 1e-7])
 def test_a_run_is_no_more_precise_than_required(required):
-    scene = turning(positions=90)
-    record = judge("s", scene, adjust_engines(THROUGH_TIME, required))
+    record = judge("s", turning(positions=90), adjust_engines(THROUGH_TIME, required))
     assert not [row for row in record.rows if row.failed]
     (answer,) = record.answers
     errors = [
@@ -215,9 +209,8 @@ def test_what_matters_for_a_scene_is_measured_and_stated_with_its_reason():
         (hood(0.01), "the stiffness by pads", "lighter of coupler and output"),
         (turning(10.0, 36), "the timestep", "the steps themselves"),
     ):
-        setup = JudgedSetup(scene)
         first, *others = influences = matters.measure_influences(
-            scene, setup, advise.make_settings(40.0, 12.0)
+            scene, JudgedSetup(scene), advise.make_settings(40.0, 12.0)
         )
         assert first.setting == setting and first.times > 10.0
         assert why in matters.write_sentence(influences)

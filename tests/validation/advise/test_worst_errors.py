@@ -61,8 +61,7 @@ def test_what_is_no_number_is_no_small_error():
 
 def test_a_run_is_read_at_every_step_and_judged_between_them():
     """The scene's own 40 positions, and 180 more, are fewer than the steps."""
-    setup = JudgedSetup(SCENE)
-    trial = setup.try_out(Settings(steps_per_revolution=250.0))
+    trial = JudgedSetup(SCENE).try_out(Settings(steps_per_revolution=250.0))
     assert trial.steps > 200
     assert trial.readings == trial.steps + 1
 

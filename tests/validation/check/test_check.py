@@ -529,8 +529,7 @@ def test_every_hypothesis_has_a_case_and_no_two_have_one_text(read):
     listed = list(list_column_mistakes(solve(OURS)))
     for scene in SCENES.values():
         texts = [mistake.text for mistake in list_hypotheses(scene, command(scene))]
-        table = read(write(right(scene)))
-        calculated = find_miscalculated(Judge(scene, table))
+        calculated = find_miscalculated(Judge(scene, read(write(right(scene)))))
         texts_of_columns = (mistake.text for mistake in calculated if mistake.whole)
         every = [*texts, *texts_of_columns]
         assert len(set(every)) == len(every)
@@ -636,8 +635,7 @@ def test_the_table_of_another_scene_is_explained(words, read):
 """),
 )
 def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check):
-    still = recommand(OURS, speed=0.0)
-    scene = replace(still, effects=(Friction.at(O2=0.5),))
+    scene = replace(recommand(OURS, speed=0.0), effects=(Friction.at(O2=0.5),))
     numbers = right(scene)
     columns = {
         "theta_2": numbers["theta_2"],
@@ -833,8 +831,7 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     assert "not a known column" not in table.left_out.values()
     assert Judgement(scene, table).status == HOLDS
     if any(scene.origin):
-        unmoved = read_table(path, points=points)
-        assert list_differing(scene, unmoved) >= {"A", "B"}
+        assert list_differing(scene, read_table(path, points=points)) >= {"A", "B"}
     made = [key for key in table.columns if key.strip("|") not in UNITS]
     assert len(made) > len(MADE_OF)
     for key in table.columns.keys() - {*NOT_JUDGED, table.found_by}:
@@ -888,8 +885,7 @@ def test_a_stated_tolerance_decides_and_the_exact_count_stands_next_to_it(
     assert code == FAILED and failing == ["torque"] and not report["holds"]
     assert (report["compared"], report["agree"]) == (count, count - rows)
     assert {finding["quantity"] for finding in report["differing"]} == {"torque"}
-    first = report["differing"][0]
-    assert first["theirs"] == approx([off["torque"][0]], rel=1e-15)
+    assert report["differing"][0]["theirs"] == approx([off["torque"][0]], rel=1e-15)
     code, printed, report, failing = judge("--rtol", "1e-3")
     agreed = f"{count} of {count} numbers agree within rtol 0.001, atol 0"
     assert code == HOLDS and f"{agreed}; {count - rows} to round-off" in printed
@@ -961,8 +957,7 @@ def test_a_log_is_judged_at_the_speed_of_each_row_where_the_scene_states_none(re
     log = right(OURS, speed=speed, acceleration=acceleration) | rates
 
     def judge(scene, *names):
-        text = write(log, (*rates, *names)).replace("nan", "")
-        return Judgement(scene, read(text))
+        return Judgement(scene, read(write(log, (*rates, *names)).replace("nan", "")))
 
     assert judge(OURS, *ALL).status == FAILED  # at the scene's one speed
     judgement = judge(WITHOUT_SPEED, *ALL)
@@ -1055,8 +1050,7 @@ def test_degrees_under_a_bare_theta_2_are_recognised_and_said(torques):
     table = torques("theta_2,torque")
     assert Judgement(OURS, table).status == HOLDS
     (note,) = table.notes
-    words = "theta_2 has no unit and goes to 330: it is read as degrees"
-    assert note.startswith(words)
+    assert note.startswith("theta_2 has no unit and goes to 330: it is read as degrees")
 
 
 @mark.parametrize("heading", ["omega", "R12x [N]", "F12 / F32", "T12 [K]", "W3 [N]"])
@@ -1117,9 +1111,8 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
         Bar(2.33, output_mass, 50.13),
     )
     load = Load(3, (100.0, math.pi / 2.0), from_pin=(3.06, math.radians(-31.0)))
-    motion = Motion(math.radians(60.0), 10.0, 5.0)
     code, printed, _ = check(
-        Scene(linkage, motion, loads=(load,)),
+        Scene(linkage, Motion(math.radians(60.0), 10.0, 5.0), loads=(load,)),
         "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]\n"
         "60,14271.89,23647.43,24055.14,7798.85,7515.91\n",
     )

@@ -162,8 +162,7 @@ def test_the_rounding_of_another_bars_angle_is_allowed_for(judged):
     right = solve(scene, at=at_angles([1.2, 1.7, 2.4]))
     for off, code in ((0.0, HOLDS), (1e-5, FAILED)):
         torque = right.torque * (1.0 + off)
-        found = judged(scene, "theta_4", right.theta_4, torque, "{:.6f}")
-        assert found.status == code
+        assert judged(scene, "theta_4", right.theta_4, torque, "{:.6f}").status == code
 
 
 def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
@@ -288,8 +287,7 @@ def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
     time = (theta - math.radians(start)) / speed
-    text = write("time,torque", time, solve(scene).torque)
-    judgement = Judgement(scene, read(text))
+    judgement = Judgement(scene, read(write("time,torque", time, solve(scene).torque)))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
 
@@ -298,8 +296,7 @@ def test_times_that_nobody_rounded_leave_all_digits(times, read):
     theta, _, _, torque = follow_rise(np.array(times))
     rows = zip(times, np.degrees(theta), torque, strict=True)
     lines = [f"{time:g},{angle:.4f},{number:.8f}" for time, angle, number in rows]
-    table = read("\n".join(["time,theta_2 [deg],torque", *lines]))
-    judgement = Judgement(SERVO, table)
+    judgement = Judgement(SERVO, read("\n".join(["time,theta_2 [deg],torque", *lines])))
     assert judgement.status == HOLDS and judgement.digits[0] >= "7"
 
 
@@ -313,8 +310,7 @@ def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged)
     first = scene.linkage.ground_angle + CYLINDER.ends[0][1].angle
     theta = first + np.arccos(cosine) - CYLINDER.ends[1][1].angle
     theta[1] += 1e-6
-    table = read(write("stroke,theta_2", stroke, theta), "stroke")
-    judgement = Judgement(scene, table)
+    judgement = Judgement(scene, read(write("stroke,theta_2", stroke, theta), "stroke"))
     assert [finding.line for finding in judgement.differing] == [3]
     assert judgement.compared == 3 and judgement.table.found_by == "theta_2"
     own = solve(scene, "position")

@@ -52,13 +52,12 @@ def compare(
     answer, scene=SCENE, formulas=FORMULAS, demanded=COMPARED_QUANTITIES, **held
 ):
     """Return the rows of an answer by quantity."""
-    demands = Demands(EQUIVALENCE, demanded, **held)
     comparison = Comparison(
         "scene",
         scene,
         answer,
         formulas,
-        demands,
+        Demands(EQUIVALENCE, demanded, **held),
     )
     closure = [comparison.closure()] if "theta_3" in answer.quantities else []
     return {row.quantity: row for row in [*comparison.rows(), *closure]}
@@ -126,8 +125,7 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
     solution = fourbar.solve(longer, "position")
     assert not solution.assembled.all()
-    everywhere = np.ones(len(solution), dtype=bool)
-    answer = Answer("other", "exact", solution.at, everywhere)
+    answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
     assert compare(answer, longer, solution, ())["assembled"].failed
 
 
@@ -164,13 +162,12 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
         assert list_failing(compare(answer, scene, formulas)) == {name}
     importorskip("flint")
     answer.quantities = right | {"torque": right["torque"] * (1.0 + 1e-8)}
-    predict = partial(predict_from_data, scene, formulas.at)
     rows = compare(
         answer,
         scene,
         formulas,
         ("torque",),
-        predicted=predict,
+        predicted=partial(predict_from_data, scene, formulas.at),
     )
     assert list_failing(rows) == {"torque"}
 

@@ -185,15 +185,12 @@ def test_what_is_due_nowhere_is_not_counted_as_held(monkeypatch):
 def test_formulas_without_an_answer_fail():
     scene = crank_rocker()
     commanded = command(scene)
-    answer = Echo(echo).answer(scene, commanded)
-    positions = fourbar.solve(scene, "position", at=commanded)
-    demands = Demands(EQUIVALENCE, ("torque",))
     rows = Comparison(
         "",
         scene,
-        answer,
-        positions,
-        demands,
+        Echo(echo).answer(scene, commanded),
+        fourbar.solve(scene, "position", at=commanded),
+        Demands(EQUIVALENCE, ("torque",)),
     ).rows()
     (row,) = [row for row in rows if row.quantity == "torque"]
     assert (row.verdict, row.reason) == (FAILS, "the formulas have no answer")
@@ -218,8 +215,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     assert '<span class="bad">nothing compared</span>' in page
     # nor is it green beside an engine that compares all
     assert status([*line, "mujoco-simulated,free-body"]) == FAILED
-    said = " ".join(capsys.readouterr().out.split())
-    assert said.startswith(
+    assert " ".join(capsys.readouterr().out.split()).startswith(
         "NOT CHECKED: mujoco-simulated: nothing compared (1 scene): "
     )
     assert status([*line, "free-body"]) == HOLDS

@@ -111,8 +111,7 @@ def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
     """The accelerations of A and B, over the bar's length and the sine between both."""
     a, b, c = 0.25, 0.1, 0.22
     for name, length in (("alpha_3", b), ("alpha_4", c)):
-        scene = Scene(ROCKER, Motion([0.9], 10.0, 7.0))
-        s, scale = solve_with_scale(name, scene)
+        s, scale = solve_with_scale(name, Scene(ROCKER, Motion([0.9], 10.0, 7.0)))
         terms = a * 107.0 + b * s.omega_3**2 + c * s.omega_4**2
         expected = terms / (length * s.condition * np.abs(s[name]))
         np.testing.assert_allclose(scale.cancellation, expected)
@@ -149,5 +148,4 @@ def test_the_pair_that_allows_less_of_an_error_is_taken_whole():
     assert taken.size.tolist() == [3.0, 2.0, 1.0]
     assert taken.cancellation.tolist() == [1.0, 1.0, 1.0]
     assert taken.vanishes.tolist() == [True, False, True]
-    again = theirs.take_strictest(ours)
-    assert again.size.tolist() == taken.size.tolist()
+    assert theirs.take_strictest(ours).size.tolist() == taken.size.tolist()

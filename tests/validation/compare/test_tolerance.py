@@ -42,8 +42,7 @@ def test_angles_differ_modulo_a_turn_and_vectors_by_their_norm(
 ):
     pair = np.array([ours]), np.array([theirs])
     assert compute_difference(name, *pair) == approx([apart], rel=1e-15)
-    error = find_error(name, *pair, np.array([10.0]))
-    assert error == approx(apart / 10.0)
+    assert find_error(name, *pair, np.array([10.0])) == approx(apart / 10.0)
 
 
 def test_arrays_of_two_shapes_have_no_error_and_no_size_demands_zero():

@@ -45,10 +45,9 @@ def turning(omega=10.0, positions=36):
     """Return the crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over
     a revolution.
     """
-    sweep = fourbar.Sweep(0.0, 2.0 * math.pi, positions)
     return fourbar.Scene(
         CONTENDED_LINKAGE,
-        fourbar.Motion(sweep, omega),
+        fourbar.Motion(fourbar.Sweep(0.0, 2.0 * math.pi, positions), omega),
         effects=(fourbar.Gravity(),),
     )
 
@@ -224,8 +223,7 @@ def test_a_study_is_resumed_where_it_was_interrupted(tmp_path):
 
     with raises(KeyboardInterrupt):
         list(units("b").points())
-    points = dict(units(None).points())
-    curves = [p.curve for row in points.values() for p in row]
+    curves = [p.curve for row in dict(units(None).points()).values() for p in row]
     assert done == curves == ["a", "b", "c"]
     stated = json.loads((tmp_path / "run.json").read_text())
     assert stated["study"] == work_precision.STUDY_VERSION

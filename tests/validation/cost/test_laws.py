@@ -41,8 +41,7 @@ def test_a_floor_is_the_last_error_that_twice_the_steps_do_not_lessen():
     assert find_floor(falling, "torque") is None
     floored = [*falling, point(2560.0, 0.9 / STEPS[-1])]
     assert find_floor(floored, "torque") == approx(0.9 / STEPS[-1])
-    lost = [*falling, point(2560.0, math.inf)]
-    assert find_floor(lost, "torque") is None
+    assert find_floor([*falling, point(2560.0, math.inf)], "torque") is None
 
 
 def test_the_cheapest_within_an_error_is_judged_by_the_quantity_that_is_asked():
@@ -64,5 +63,4 @@ def test_nothing_on_the_front_is_beaten_in_cost_and_error():
         point(40.0, math.nan),
         point(50.0, 1e-4),
     ]
-    front = find_pareto(points, "F12")
-    assert [p.steps for p in front] == [10, 30]
+    assert [p.steps for p in find_pareto(points, "F12")] == [10, 30]

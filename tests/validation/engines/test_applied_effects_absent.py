@@ -38,8 +38,7 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     A tendon is one at the cut pin B, or one for each linear spring.
     """
     effects = (ACTING[name],) if name else ()
-    text = write_mjcf(crank_rocker(loads=(), effects=effects))
-    model, data = forward(text)
+    model, data = forward(write_mjcf(crank_rocker(loads=(), effects=effects)))
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     disabled = {

@@ -34,5 +34,4 @@ def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
     told = engine.command
     assert told.branch.tolist() == [branch, -branch, -branch, branch]
     engine.at = told._replace(angle=angles + 1e-3)
-    made = ask_at(engine, scene, command).at
-    assert made.branch.tolist() == [branch] * 4
+    assert ask_at(engine, scene, command).at.branch.tolist() == [branch] * 4

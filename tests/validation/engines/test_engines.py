@@ -136,8 +136,7 @@ def answered(name, case, at=None):
 def at_limit(linkage, offset, branch=1):
     """A scene at an angle before bars 3 and 4 are stretched."""
     d, a, b, c = linkage.lengths
-    limit = find_angle(b + c, d, a)
-    return Scene(linkage, Motion(limit - offset, 1.0, branch=branch))
+    return Scene(linkage, Motion(find_angle(b + c, d, a) - offset, 1.0, branch=branch))
 
 
 def failures(name, case, every=1):
@@ -146,14 +145,12 @@ def failures(name, case, every=1):
     answer = answered(name, case, commanded)
     if answer.refusal is not None:
         return [("refusal", answer.refusal)]
-    right = fourbar.solve(case, "force", at=commanded)
-    demands = Demands(EQUIVALENCE, COMPARED_QUANTITIES)
     comparison = Comparison(
         "scene",
         case,
         answer,
-        right,
-        demands,
+        fourbar.solve(case, "force", at=commanded),
+        Demands(EQUIVALENCE, COMPARED_QUANTITIES),
     )
     rows = [*comparison.rows(), comparison.closure()]
     assert {"F12", "torque" if case.drive is None else "stroke_speed"} <= {
@@ -472,8 +469,7 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
     Bars 3 and 4 accelerate up to 4000 rad/s^2 there, and what is solved for all bars at
     once must not leave their rounding in bar 2.
     """
-    case = Random(index + 1, 3, tuple(DrawnType)).scene(index)
-    assert failures(name, case) == []
+    assert failures(name, Random(index + 1, 3, tuple(DrawnType)).scene(index)) == []
 
 
 @mark.parametrize(

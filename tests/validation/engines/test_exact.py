@@ -42,6 +42,5 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
 def test_the_status_on_a_change_point_in_decimals_is_right():
     linkage = fourbar.uniform(0.08, 0.1, 0.12, 0.06)
     motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)
-    question = make_question("s", fourbar.Scene(linkage, motion), ())
-    (row,) = check_status(question)
+    (row,) = check_status(make_question("s", fourbar.Scene(linkage, motion), ()))
     assert row.passed and "1 change_point" in row.reason

@@ -108,8 +108,7 @@ def test_a_lever_of_an_upright_rectangle(drive, forces):
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
     """
     load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
-    scene = Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,))
-    got = answered(scene)
+    got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == approx(1.0, abs=1e-14)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
         assert got[name][0] == approx(force, abs=1e-13), name

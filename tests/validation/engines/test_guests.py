@@ -519,8 +519,7 @@ def test_parts_judged_by_another_code_are_made_again(tmp_path, monkeypatch, suit
     def run_once():
         heard, engines = Interrupting(), guests.read_guests(["mine:Mine", program], ())
         with raises(KeyboardInterrupt):
-            plan = Plan(suite, engines, drawn=False)
-            run(plan, tmp_path / "out", heard)
+            run(Plan(suite, engines, drawn=False), tmp_path / "out", heard)
         return heard.lines
 
     again = ["made again: the parts of another run (engines)"]

@@ -48,8 +48,7 @@ def touch():
     """
     limit = next(x.theta_2 for x in limit_positions(ROCKER) if 0.0 < x.theta_2 < np.pi)
     angles = limit + np.arange(-30, 31, 4) * EPS
-    scene = Scene(ROCKER, Motion(angles, 3.0))
-    solution = fourbar.solve(scene)
+    solution = fourbar.solve(Scene(ROCKER, Motion(angles, 3.0)))
     closed = angles[(solution.status_code == 0) & mark_touching(ROCKER, angles)]
     assert len(closed) >= 3
     return Scene(ROCKER, Motion(closed, 3.0))
@@ -76,12 +75,11 @@ def test_a_place_that_is_wrong_by_a_half_fails_where_the_loop_just_closes(
     solution = question.solution
     numbers = {name: np.array(getattr(solution, name)) for name in COMPARED_QUANTITIES}
     numbers[quantity] *= 1.5
-    closes = np.array(solution.assembled)
     answer = Answer(
         "spoiled",
         "exact",
         question.at,
-        closes,
+        np.array(solution.assembled),
         numbers,
     )
     rows = compare_answer(question, ENGINE, answer)
@@ -214,8 +212,7 @@ def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():
 
 
 def test_a_motion_is_predicted_under_pin_friction_and_its_forces_are_not():
-    friction = fourbar.PinFriction.at(O4=(0.15, 0.006))
-    scene = crank_rocker(effects=(friction,))
+    scene = crank_rocker(effects=(fourbar.PinFriction.at(O4=(0.15, 0.006)),))
     at = fourbar.command(scene)
     engine = list_engines()["free-body"]
     predict = make_prediction(engine, scene, at, engine.start().answer(scene, at))

@@ -83,8 +83,7 @@ def same(one, two):
 def test_every_scene_and_command_comes_back_bit_for_bit():
     seen = 0
     for scene in scenes():
-        data = through_text(protocol.scene_to_json(scene))
-        back = protocol.scene_from_json(data)
+        back = protocol.scene_from_json(through_text(protocol.scene_to_json(scene)))
         assert back == stated(scene)
         if scene.motion.free is not None:
             sent = through_text(protocol.release_to_json(scene))

@@ -109,8 +109,7 @@ def test_verdicts(printed, ours, noise, verdict):
 
 @mark.slow
 def test_every_figure_is_compared():
-    tables = Counter(figure.table for figure in list_all())
-    assert tables == {
+    assert Counter(figure.table for figure in list_all()) == {
         "2.4 positions": 281 * 4,
         "2.4 constants": 16,
         "3.2 limits": 7,
@@ -216,9 +215,8 @@ def test_torques_that_the_errata_state():
 
 def test_open_loops_that_the_errata_state():
     """Closure of the angles as printed, in the thesis's polygon, cm."""
-    file = FOLDER / "data" / "positions.csv"
     rows = np.loadtxt(
-        file,
+        FOLDER / "data" / "positions.csv",
         delimiter=",",
         skiprows=1,
         usecols=range(5),

@@ -104,8 +104,7 @@ def test_kinds_are_counted_and_shown(compared):
         assert f" {count} {kind}" in verdict
         shown = f"\n{kind.capitalize()}: case " in f"\n{text}"
         assert shown == (kind != Kind.SAME)
-    newly = replace(OTHER, verdict=FAILS, reason=WHY)
-    found = compare_made_here([ROW], [ROW, newly])
+    found = compare_made_here([ROW], [ROW, replace(OTHER, verdict=FAILS, reason=WHY)])
     assert all(WHY in html.unescape(form(found)) for form in FORMS)
 
 
@@ -239,8 +238,7 @@ def test_what_was_not_asked_for_is_not_run_and_what_was_is_gone():
         asked = about({row.engine: "" for row in rows}, **settings)
         whole.settings["chosen"] = before
         found = compare_rows((whole, both), (asked, rows))
-        left = found.name_whole(Kind.NOT_RUN)
-        assert (left, found.gone) == (not_run, gone), settings
+        assert (found.name_whole(Kind.NOT_RUN), found.gone) == (not_run, gone), settings
         assert found.status == bool(gone) and not found.strange
         assert not found.sentences  # nobody disagrees
 
@@ -249,8 +247,7 @@ def test_the_rule_that_a_row_is_held_to_is_not_stated_as_a_cause():
     rule = f"{EQUIVALENCE.cause}: 50 eps over the condition 0.5"
     for reason, stated in ((rule, f"held to {rule}"), (WHY, WHY)):
         failing = changed(verdict=FAILS, error=1.0, reason=reason)
-        found = compare_made_here([ROW], [failing])
-        text = render.write_differences(found)
+        text = render.write_differences(compare_made_here([ROW], [failing]))
         assert f", agrees -> fails: {stated}\n" in text
         assert f", agrees -> fails ({stated});" in text
 

@@ -556,8 +556,7 @@ def test_a_wider_tolerance_is_a_regression_over_two_nights(
         code, (first, *lines) = compare(kept, night)
         assert code == FAILED
         assert re.match("Weaker rule: engine: factor 1.11.*-> 0.01$", first)
-        worse = any(line.startswith("Worse: ") for line in lines)
-        assert worse == (night == nights[1])
+        assert any(line.startswith("Worse: ") for line in lines) == (night == nights[1])
         code, _, refused = call("accept", night, "--to", kept)
         assert code == BAD_INPUT
         assert "--allow-weaker" in refused and "engine: factor" in refused

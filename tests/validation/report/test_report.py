@@ -154,8 +154,7 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches():
         worst = find_worst_of_segments(error, phase)
         assert len(worst) == STRETCHES
         assert int(np.argmax(error)) in worst
-        turned = np.roll(worst, -int(np.argmin(worst)))
-        assert np.all(np.diff(turned) > 0)
+        assert np.all(np.diff(np.roll(worst, -int(np.argmin(worst)))) > 0)
     error[worst[3]] = np.nan
     assert worst[3] not in find_worst_of_segments(error, 0.9)
     assert len(find_worst_of_segments(np.full(40, np.nan), 0.0)) == 0
@@ -181,8 +180,7 @@ def test_the_times_of_engines_are_those_of_the_run():
     for engine, taken in seconds.items():
         line = lines[engine]
         assert line.microseconds == approx(2.0 * 1e6 * taken / 37, rel=1e-12)
-        times = taken / seconds["formulas"]
-        assert line.times_formulas == approx(times, rel=1e-12)
+        assert line.times_formulas == approx(taken / seconds["formulas"], rel=1e-12)
         assert WORK[engine] in page
     refused = replace(bare.rows[0], engine="free-body", verdict=REFUSES)
     silent = summary_of([replace(bare, rows=[*bare.rows, refused])])
@@ -273,8 +271,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     torque = replace(row, quantity="torque", error=1e-12, allowed=1e-6)
     refused = replace(row, quantity="theta_3", verdict=REFUSES, reason="too fast")
     rows = [row, share, identity, torque, refused]
-    left_out = ["equilibria: too near"]
-    summary = summary_of([record_of("first", rows, left_out=left_out)])
+    summary = summary_of([record_of("first", rows, left_out=["equilibria: too near"])])
     first, second = summary.engines
     assert (first.engine, second.engine) == ("mujoco-simulated", "formulas")
     assert first.worst[""] == row and first.undecided == 0.4
@@ -424,8 +421,7 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
         fail(mine(engine="one", quantity="torque_inertia"), 0.2),
     ]
     against = {key: ["one", "two"] for key in ("torque", *PIN_FORCES, "theta_3")}
-    summary = summary_of([record_of("a", rows, against=against)])
-    (cause,) = summary.causes
+    (cause,) = summary_of([record_of("a", rows, against=against)]).causes
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."

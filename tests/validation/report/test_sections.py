@@ -35,8 +35,7 @@ def list_holding():
 
 
 def test_every_scene_is_counted_in_its_family_alone():
-    rows = list_holding()
-    table = {row[0]: row for row in collect_hard_cases(rows).rows}
+    table = {row[0]: row for row in collect_hard_cases(list_holding()).rows}
     for family in HARD_FAMILIES:
         count = str(sum(1 for _ in family.scenes()))
         row = table.pop(family.name)
@@ -59,8 +58,7 @@ def test_a_failing_row_fails_its_family_in_the_report():
 
 
 def test_the_report_of_the_hard_suite_has_every_statement_and_every_limit(tmp_path):
-    rows = list_holding()
-    parts = collect_sections(rows, tmp_path)
+    parts = collect_sections(list_holding(), tmp_path)
     assert [part.key for part in parts] == ["hard", "engine-limits"]
     assert not list(tmp_path.iterdir())
     text = write_html(summary_of([]), {}, sections=parts)

@@ -225,8 +225,7 @@ def test_a_mistake_is_named_wherever_the_drive_acts(bar):
         (NO_VELOCITY_TERMS, "(dJ/dt) v is missing in the accelerations of the loop"),
         (CUT_AT_B, TREE),
     ):
-        guest = make_guest(*right, *pair)
-        assert find_causes(guest, scene)[0] == words
+        assert find_causes(make_guest(*right, *pair), scene)[0] == words
 
 
 @mark.parametrize(
@@ -237,8 +236,7 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(cut, bar, joint, b
     """The work of the weights in a tree whose driven joint alone turns is that of its
     torque.
     """
-    still = recommand(SCENE, speed=0.0, acceleration=0.0)
-    scene = replace(still, drive_bar=bar)
+    scene = replace(recommand(SCENE, speed=0.0, acceleration=0.0), drive_bar=bar)
     right = fourbar.solve(scene, "force")
     torque = sum(
         scene.linkage.bar(one).mass * 9.81 * (right[f"G{one}"] - right[joint])[:, 0]
@@ -356,8 +354,7 @@ def test_mistakes_in_several_columns_are_named_together():
         numbers["F12"] = numbers["F12"] * (-1.0, 1.0)
 
     of_F43 = "sign reversed, or F_ij given for F_ji: F43"
-    causes = find_causes_of(reverse_both)
-    assert causes[0] == f"{of_F43}; x reversed: F12"
+    assert find_causes_of(reverse_both)[0] == f"{of_F43}; x reversed: F12"
 
 
 @mark.parametrize("spoiled", [["alpha_3"], ["alpha_3", "a_G3"]])
@@ -401,8 +398,7 @@ def test_a_mistake_of_the_inertia_alone_is_said_to_be_there():
             return answer
 
     (cause,) = find_causes(partial(OfInertia, nothing))
-    words = "without loads and effects: every number is 1.5 times ours: torque"
-    assert cause == words
+    assert cause == "without loads and effects: every number is 1.5 times ours: torque"
 
 
 @mark.parametrize("name", ["stroke_output", "cylinder_2_3", "push_output"])
@@ -421,8 +417,7 @@ def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
         for force in (*PIN_FORCES, "drive_force"):
             numbers[force] = inertial[force] + weighing[force] - neither[force]
 
-    causes = find_causes_of(leave_out_weight, scene)
-    assert "the weight of bar 3 is missing" in causes
+    assert "the weight of bar 3 is missing" in find_causes_of(leave_out_weight, scene)
 
 
 def scale(without, factor=0.0):
@@ -642,8 +637,7 @@ def test_what_acts_may_be_missing_in_some_quantities(names, where):
         without = FreeBody().answer(replace(SCENE, effects=()), at).quantities
         numbers |= {name: without[name] for name in names}
 
-    causes = find_causes_of(leave_out)
-    assert causes[0] == f"effects.gravity left out {where}"
+    assert find_causes_of(leave_out)[0] == f"effects.gravity left out {where}"
 
 
 def name_wrong(changes, tolerance=EQUIVALENCE):

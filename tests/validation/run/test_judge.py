@@ -48,8 +48,7 @@ class Echo:
     def answer(self, scene, command):
         s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
         numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
-        assembled = np.array(s.assembled)
-        answer = Answer("echo", "exact", command, assembled, numbers)
+        answer = Answer("echo", "exact", command, np.array(s.assembled), numbers)
         return self.spoil(answer) or answer
 
 

@@ -99,8 +99,7 @@ a file that loads hold | 22 | 28
 """),
 )
 def test_a_simulation_of_uneven_bars_raises_no_alarm(why, seed, index):
-    scene = draw_random_scene(int(seed), int(index), ())
-    assert not list_failed(scene, THROUGH_TIME)
+    assert not list_failed(draw_random_scene(int(seed), int(index), ()), THROUGH_TIME)
 
 
 @mark.parametrize(
@@ -182,10 +181,9 @@ def test_moments_about_far_centres_are_right_to_full_accuracy():
     )
     reasons = ""
     for index in far:
-        scene = replace(suite.scene(index), loads=())
         rows = judge(
             names[index],
-            scene,
+            replace(suite.scene(index), loads=()),
             [right, wrong],
         ).rows
         failed = {(row.engine, row.quantity) for row in rows if row.failed}

@@ -29,8 +29,7 @@ def falling(coupler=0.15):
     With a coupler of 0.12 m that is a change point.
     """
     linkage = FourBar(0.3, Bar(0.2, 0.2), Bar(coupler, 0.5), Bar(0.22, 0.4))
-    released = Motion(1.0, 0.0, free=Free(1.0, 100))
-    return Scene(linkage, released, effects=(Gravity(),))
+    return Scene(linkage, Motion(1.0, 0.0, free=Free(1.0, 100)), effects=(Gravity(),))
 
 
 BEFORE_THE_LINE = 2e-6
@@ -76,8 +75,7 @@ def find_spread_by_energy(scene, solution, instant, engine):
 
 
 def ask_briefly():
-    released = recommand(falling(), free=Free(0.1, 5))
-    return make_question("falling", released, ENGINES)
+    return make_question("falling", recommand(falling(), free=Free(0.1, 5)), ENGINES)
 
 
 def row(rows, engine, quantity):
@@ -114,8 +112,7 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
         )
         assert spread < MOST_SPREAD[coupler][engine], (engine, spread)
         assert passed.error < BEFORE_THE_LINE + spread, passed
-    before = recommand(scene, free=Free(first / 100.0, first))
-    rows = judge("falling", before).rows
+    rows = judge("falling", recommand(scene, free=Free(first / 100.0, first))).rows
     for engine in free.FORWARD:
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
 
@@ -127,10 +124,8 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     """The couples of dry friction that hold it are those of its own assembly."""
     friction = Friction.at(**dict.fromkeys(("O2", "A", "B", "O4"), 5.0))
     motion = Motion(np.radians(250.0), 0.0, branch=branch, free=Free(0.1, 2))
-    linkage = uniform(0.3, 0.1, 0.3, 0.1)
-    scene = Scene(linkage, motion, effects=(Gravity(), friction))
-    solution = solve(scene)
-    assert not solution.omega_2.any()
+    scene = Scene(uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(Gravity(), friction))
+    assert not solve(scene).omega_2.any()
     rows = judge("held", scene).rows
     assert {row.engine for row in rows if row.quantity == "F43"} >= {
         "pinocchio-inverse",
@@ -143,8 +138,7 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
 @mark.parametrize("bar", ["coupler", "output"])
 def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     scene = falling()
-    massless = Bar(getattr(scene.linkage, bar).length)
-    without = relink(scene, **{bar: massless})
+    without = relink(scene, **{bar: Bar(getattr(scene.linkage, bar).length)})
     answer = PinocchioReleased().release(without, np.zeros(1))
     assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
 

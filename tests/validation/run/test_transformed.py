@@ -92,8 +92,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
         "friction": {"superposed", "split masses"},
         "arm": {"split masses"},
     }
-    held = list_held(SCENES[name])
-    assert held == TRANSFORMATIONS.keys() - left_out.get(name, set())
+    assert list_held(SCENES[name]) == TRANSFORMATIONS.keys() - left_out.get(name, set())
     _, rows = ask(SCENES[name])
     assert rows["scaled"].error == rows["scaled"].allowed == 0.0
 

@@ -58,8 +58,7 @@ def test_the_default_suite_uses_every_capability():
     assert any(one and "flywheel" in keys for one, keys in zip(released, effects))  # noqa: B905
     needs = [{*list_needs(scene)} - {"gravity"} for scene in scenes]
     alone = set().union(*(words for words in needs if len(words) == 1))
-    together = set().union(*needs)
-    assert together - alone == {"one_sided"}
+    assert set().union(*needs) - alone == {"one_sided"}
     assert {"springs", "one_sided"} in needs
 
 

@@ -118,10 +118,9 @@ def texts_shown(figure):
                     off_axis |= {tick.label1, tick.label2}
         if not axes.axison:
             off_axis |= {axes.xaxis.label, axes.yaxis.label}
-    texts = figure.findobj(lambda artist: isinstance(artist, Text))
     shown = [
         t
-        for t in texts
+        for t in figure.findobj(lambda artist: isinstance(artist, Text))
         if t.get_visible() and t.get_text().strip() and t not in off_axis
     ]
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
@@ -299,8 +298,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
 @mark.slow
 def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     """The torque of bar 4 diverges where bars 2 and 3 are in line."""
-    shown = make_view(THREE_ROCKERS)
-    sweep = shown.sweep
+    sweep = make_view(THREE_ROCKERS).sweep
     figure = composed(THREE_ROCKERS, "torque")
     panel = figure.axes[0]
     x, y = panel.lines[1].get_data()
@@ -435,8 +433,7 @@ def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
     figure, quantity, rings
 ):
     """The power stays bounded where the output, which is driven, stands still."""
-    motion = Motion(Sweep(0.2, 1.5, 5), 10.0)
-    scene = crank_rocker(motion=motion, drive_bar=4)
+    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.5, 5), 10.0), drive_bar=4)
     panels = composed(scene, figure).axes
     (panel,) = (axes for axes in panels if axes.get_title("left").startswith(quantity))
     crossed = [line.get_xdata() for line in panel.lines if len(line.get_xdata()) == 2]
@@ -534,8 +531,7 @@ instants 2 ms apart.
 def test_the_work_of_what_acts_is_the_kinetic_energy():
     damped = Viscous.at(O2=0.002, B=0.001)
     scene = released(effects=(Gravity(), damped, Flywheel(0.01, 4)))
-    motion = solve(scene)
-    energies = duty.compute_energies(scene, motion)
+    energies = duty.compute_energies(scene, solve(scene))
     assert set(energies.work) == {"loads", "gravity", "viscous"}
     largest = energies.kinetic.max()
     assert largest > 0.1
@@ -565,8 +561,7 @@ def test_a_film_of_what_swings_goes_there_and_back(scene):
 
 
 def test_a_film_leaps_over_no_gap():
-    scene = thesis(Sweep(0.0, 4 * pi, 240))
-    shown = make_view(scene)
+    shown = make_view(thesis(Sweep(0.0, 4 * pi, 240)))
     order = film.choose_frames(shown, 40)
     assert shown.sweep.assembled[min(order) : max(order) + 1].all()
 
@@ -577,8 +572,7 @@ def test_a_film_of_what_turns_goes_round():
 
 def test_one_position_of_another_command_stands_in_its_range():
     """The cylinder's shortest and longest stroke, and the limits of the output."""
-    single = COMMANDS["stroke (mm)"].replace(angle=0.3)
-    shown = make_view(commanding(single))
+    shown = make_view(commanding(COMMANDS["stroke (mm)"].replace(angle=0.3)))
     assert shown.at == "stroke = 300 mm"
     assert shown.here.stroke[0] == approx(0.3, rel=1e-14)
     places = shown.sweep.at.places
