@@ -9,8 +9,8 @@ acceleration,
 Free bodies held at many positions between say that no equilibrium was missed.
 """
 
-import math
 from dataclasses import replace
+from math import inf, pi, remainder, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -148,12 +148,12 @@ def _list_samples(question):
     motion = question.scene.motion
     linkage = question.scene.linkage
     swept = solution.theta_2[solution.assembled]
-    turn = 2.0 * math.pi
+    turn = 2.0 * pi
     first = swept[0]
     reached = []
     for start, stop in find_intervals(linkage):
         half = 0.5 * (stop - start)
-        middle = first - math.remainder(first - 0.5 * (start + stop), turn)
+        middle = first - remainder(first - 0.5 * (start + stop), turn)
         reached.append((abs(first - middle) - half, middle - half, middle + half))
     _, low, high = min(reached)  # at an end it is outside by rounding
     if isinstance(motion.angle, Sweep) or motion.law is not None:
@@ -228,7 +228,7 @@ def _judge_equilibrium(scene, equilibrium):
         scene, bar, theta[bar], 1 if np.sin(further - one) > 0.0 else -1
     )
     if held is None or equilibrium.stability == "undecided":
-        return math.inf, {}
+        return inf, {}
     torque, slope, inertia = held
     errors = {
         "torque": divide(abs(torque.value), torque.size),
@@ -236,19 +236,19 @@ def _judge_equilibrium(scene, equilibrium):
         "inertia": divide(abs(inertia.value - equilibrium.inertia), inertia.size),
     }
     part = [divide(K * EPS * x.size, abs(x.value)) for x in (slope, inertia)]
-    off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else math.inf
+    off = K * EPS * torque.size / abs(slope.value) if part[0] < 1.0 else inf
     if part[0] < LARGEST_FIRST_ORDER:
         stable = slope.value > 0.0
         if (equilibrium.stability == "stable") != stable or (
             equilibrium.frequency is not None and not stable
         ):
-            errors["frequency"] = math.inf
+            errors["frequency"] = inf
         elif stable and part[1] < LARGEST_FIRST_ORDER:
-            frequency = math.sqrt(slope.value / inertia.value) / (2.0 * math.pi)
-            apart = abs((equilibrium.frequency or math.inf) - frequency)
+            frequency = sqrt(slope.value / inertia.value) / (2.0 * pi)
+            apart = abs((equilibrium.frequency or inf) - frequency)
             errors["frequency"] = apart / frequency / (0.5 * sum(part)) * K * EPS
         elif equilibrium.frequency is not None and part[1] >= 1.0:
-            errors["frequency"] = math.inf  # of an inertia that is rounding
+            errors["frequency"] = inf  # of an inertia that is rounding
     return off, errors
 
 

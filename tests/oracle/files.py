@@ -4,9 +4,9 @@ The free bodies assemble them.
 """
 
 import cmath
-import math
 import re
 from dataclasses import replace
+from math import atan2, nan
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
@@ -150,7 +150,7 @@ def _read_usd(text):
 
     def turn(block, key):
         w, _, _, z = numbers(block, key)
-        return 2.0 * math.atan2(z, w)
+        return 2.0 * atan2(z, w)
 
     blocks = dict(
         re.findall(
@@ -158,7 +158,7 @@ def _read_usd(text):
             text,
         )
     )
-    bodies = {"ground": _FileBody(0j, 0.0, math.nan, math.nan, 0j)}
+    bodies = {"ground": _FileBody(0j, 0.0, nan, nan, 0j)}
     for bar in MOVING_BAR_NUMBERS:
         block = blocks[bar]
         place, centre = (
@@ -186,7 +186,7 @@ def _read_usd(text):
             * cmath.rect(1.0, bodies[bar].turn)
             for end, bar in enumerate(names)
         )
-        pins[pin] = one if abs(one - second) <= K * EPS * size else complex(math.nan)
+        pins[pin] = one if abs(one - second) <= K * EPS * size else complex(nan)
         between = turn(block, "physics:localRot0") - turn(block, "physics:localRot1")
         if pin == "B":
             at_joints["coupler at B"] = at_joints[names[0]] + between

@@ -6,10 +6,10 @@ scene's own may exceed it. RMS and energies are integrated anew over the free bo
 forces.
 """
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from math import inf, nan, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -163,7 +163,7 @@ class _SummaryJudge:
     def closed(self):
         """Return whether the free bodies end as they begin, after whole turns."""
         at = self.solution.at
-        if at.moves_stroke or abs(at.angle[-1] - at.angle[0]) < math.pi:
+        if at.moves_stroke or abs(at.angle[-1] - at.angle[0]) < pi:
             return False
         for bar in MOVING_BARS:
             theta = self.own.quantities[f"theta_{bar}"]
@@ -197,7 +197,7 @@ class _SummaryJudge:
 
     def add_value(self, row, ours, theirs):
         """Add the error of a number."""
-        self.add(row, math.nan if ours is None else abs(ours - theirs) / abs(theirs))
+        self.add(row, nan if ours is None else abs(ours - theirs) / abs(theirs))
 
     def add_peak(self, row, peak, at_peak, fine):
         """Add by how much a peak is no value at its place.
@@ -237,7 +237,7 @@ def summary(question):
     for name, errors in judged.errors.items():
         error = np.array(errors)
         tolerance = LOCATED_ROUGHLY if name == "bending" else PRINTED
-        nowhere = np.full(len(errors), math.nan)
+        nowhere = np.full(len(errors), nan)
         reason = f"{len(errors)} numbers, {len(judged.fine_places)} positions"
         yield make_row(question, "summary", name, error, tolerance, nowhere, reason)
 
@@ -263,7 +263,7 @@ def _judge_ranges(judged):
         ((low, high),) = judged.facts.angles[bar]
         there = judged.ask([low.place, high.place]).quantities[f"theta_{bar}"]
         fine = np.unwrap(judged.fine.quantities[f"theta_{bar}"])
-        fine -= 2.0 * math.pi * round((fine.min() - low.value) / (2.0 * math.pi))
+        fine -= 2.0 * pi * round((fine.min() - low.value) / (2.0 * pi))
         # both ends of one range: one that is a whole turn too wide has another end
         near = np.array([fine.min(), fine.max()])
         reached = near + wrap_difference(there - near)
@@ -276,7 +276,7 @@ def _judge_ranges(judged):
         np.sin(of.quantities["theta_4"] - of.quantities["theta_3"]) ** 2
         for of in answers
     ]
-    square = math.sin(least.value) ** 2
+    square = sin(least.value) ** 2
     judged.add("ranges", np.abs(squares[0] - square))
     judged.add_excess("ranges", square - squares[1].min())
 
@@ -319,7 +319,7 @@ class _Panels(NamedTuple):
     def find_rms(self, name):
         """Return the root of the mean square of a number or vector."""
         squares = np.square(self.curves[name]).sum(axis=2)
-        return math.sqrt(self.width @ squares @ (0.5 * _WEIGHTS) / self.width.sum())
+        return sqrt(self.width @ squares @ (0.5 * _WEIGHTS) / self.width.sum())
 
     def accumulate(self, name, less=0.0):
         """Return the integral of a curve, less a number, up to each edge and zero."""
@@ -450,4 +450,4 @@ def _judge_growth(judged):
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
     if conditions.min() - np.abs(np.diff(conditions)).max() > _LEAST_CONDITION:
-        judged.add("peaks", math.inf)
+        judged.add("peaks", inf)

@@ -1,7 +1,7 @@
 """Scenes that several tests share, built in code."""
 
-import math
 from dataclasses import replace
+from math import acos, pi, radians, tau
 
 import numpy as np
 
@@ -28,7 +28,7 @@ CRANK_ROCKER_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""
-CYLINDER = LinearDrive(Place(1, (0.25, math.radians(-160.0))), Place(2, (0.09, 0.17)))
+CYLINDER = LinearDrive(Place(1, (0.25, radians(-160.0))), Place(2, (0.09, 0.17)))
 """From the ground to the input of the crank-rocker."""
 
 
@@ -43,7 +43,7 @@ def crank_rocker(**changes):
     )
     parts = {
         "linkage": linkage,
-        "motion": Motion(Sweep(0.1, 0.1 + 2 * math.pi, 60), 10.0, 5.0),
+        "motion": Motion(Sweep(0.1, 0.1 + 2 * pi, 60), 10.0, 5.0),
         "loads": (Load(4, (3.0, 0.7), arm=(0.05, 1.0)), Load(3, moment=-0.2)),
         "effects": (Gravity(),),
         "title": "crank-rocker",
@@ -52,7 +52,7 @@ def crank_rocker(**changes):
 
 
 RESTING = crank_rocker(
-    motion=Motion(math.radians(40.0), 0.0),
+    motion=Motion(radians(40.0), 0.0),
     effects=(Gravity(), Friction.at(O2=0.2)),
 )
 """Held by the drive and by dry friction, whose couple at O2 is up to 0.2 N m."""
@@ -60,7 +60,7 @@ RESTING = crank_rocker(
 
 def find_angle(side, first, second):
     """Return the angle between two sides of a triangle, opposite to the third."""
-    return math.acos((first**2 + second**2 - side**2) / (2.0 * first * second))
+    return acos((first**2 + second**2 - side**2) / (2.0 * first * second))
 
 
 def meet_circles(near, far, r_near, r_far, side=1.0):
@@ -84,34 +84,34 @@ def draw_linkage(rng, integers=False):
     while True:
         lengths = rng.integers(1, 7, 4) if integers else rng.uniform(0.1, 1.0, 4)
         if 2.0 * lengths.max() < lengths.sum() - (0.0 if integers else 0.01):
-            return bare(*map(float, lengths), float(rng.uniform(-math.pi, math.pi)))
+            return bare(*map(float, lengths), float(rng.uniform(-pi, pi)))
 
 
 def balance(left, omega_2=0.01):
     """Make a crank whose counterweight leaves a part of its weight's moment."""
     linkage = FourBar(
         0.3,
-        Bar(0.1, 0.5, 0.001, (0.1 * (1.0 - left), math.pi)),
+        Bar(0.1, 0.5, 0.001, (0.1 * (1.0 - left), pi)),
         Bar(0.25, 0.5, 0.004, (0.0, 0.0)),
         Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
     )
-    motion = Motion(Sweep(0.1, 0.1 + math.tau, 36), omega_2)
+    motion = Motion(Sweep(0.1, 0.1 + tau, 36), omega_2)
     return Scene(linkage, motion, effects=(Gravity(),))
 
 
 def balanced_lamp(omega_2=None):
     """Make a lamp that a spring of no free length balances: k = m g l/(r h)."""
     arms = Bar(0.3), Bar(0.06, 2.0), Bar(0.3)
-    linkage = FourBar(0.06, *arms, 0.5 * math.pi)
+    linkage = FourBar(0.06, *arms, 0.5 * pi)
     ends = Place(1, (0.1, 0.0)), Place(2, (0.08, 0.0))
     spring = Spring(*ends, 2.0 * 9.81 * 0.3 / (0.08 * 0.1))
-    swept = Sweep(math.radians(-40.0), math.radians(60.0), 10)
+    swept = Sweep(radians(-40.0), radians(60.0), 10)
     effects = (Gravity(), Springs((spring,)))
     return Scene(linkage, Motion(swept, omega_2), effects=effects)
 
 
 TURN = crank_rocker(
-    motion=Motion(Sweep(0.1, 0.1 + math.tau, 24), 10.0),
+    motion=Motion(Sweep(0.1, 0.1 + tau, 24), 10.0),
     points=(Point("P", 3, (0.1, 0.7)), Point("J", 4, (0.05, 0.2))),
 )
 """A turn of the crank-rocker with points on coupler and output."""

@@ -31,7 +31,10 @@ from fourbar import (
     Tolerance,
     Torsion,
     Viscous,
+    solve,
     uniform,
+    units,
+    vary,
 )
 from fourbar.cli import status
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -158,7 +161,7 @@ def uses():
             if value is not None:
                 made.setdefault(name, (partial(put, scene, path), value))
     return {
-        name: partial(lambda x, make=make: fourbar.solve(make(x)), good)
+        name: partial(lambda x, make=make: solve(make(x)), good)
         for name, (make, good) in made.items()
     }
 
@@ -167,8 +170,8 @@ def calls():
     """Every public function, used: called with good arguments."""
     link = uniform(0.3, 0.1, 0.25, 0.22)
     scene = Scene(link, Motion(1.0, 10.0))
-    solution = fourbar.solve(scene)
-    study = fourbar.vary(scene, {"lengths.input": [0.1, 0.11]})
+    solution = solve(scene)
+    study = vary(scene, {"lengths.input": [0.1, 0.11]})
     sensitivity = fourbar.sensitivity(scene)
     times, angles = (0.0, 1.0, 2.0, 3.0), (0.0, 0.1, 0.2, 0.1)
     at_O2 = {
@@ -202,9 +205,7 @@ def calls():
         **{name: partial(getattr(fourbar, name), *good[name]) for name in good},
         **{
             f"{kind.__name__}.at": partial(
-                lambda x, kind=kind: fourbar.solve(
-                    replace(scene, effects=(kind.at(O2=x),))
-                ),
+                lambda x, kind=kind: solve(replace(scene, effects=(kind.at(O2=x),))),
                 number,
             )
             for kind, number in at_O2.items()
@@ -214,7 +215,7 @@ def calls():
         ),
         "uniform": partial(uniform, 0.3, 0.1, 0.25, 0.22, per_metre=1.0),
         "vary, a value": partial(
-            lambda x: fourbar.solve(fourbar.vary(scene, {"lengths.input": x})), 0.1
+            lambda x: solve(vary(scene, {"lengths.input": x})), 0.1
         ),
         "tolerances": partial(
             lambda stated, **how: fourbar.tolerances(
@@ -224,18 +225,16 @@ def calls():
             samples=2,
             seed=0,
         ),
-        "solve": partial(
-            fourbar.solve, scene, "force", at=fourbar.command(scene), side=0
-        ),
-        "solve, a study": partial(fourbar.solve, study, "force", at=None, side=0),
-        "solve, out": partial(fourbar.solve, scene, out={"torque": np.empty(1)}),
+        "solve": partial(solve, scene, "force", at=fourbar.command(scene), side=0),
+        "solve, a study": partial(solve, study, "force", at=None, side=0),
+        "solve, out": partial(solve, scene, out={"torque": np.empty(1)}),
         "FourBar.bar": partial(link.bar, 3),
         "Scene.plot": partial(
-            crank_rocker().plot, "torque", position=0.1, units=fourbar.units("mm")
+            crank_rocker().plot, "torque", position=0.1, units=units("mm")
         ),
         "Law.at": partial(Law(times, angles).at, np.array([0.5])),
         "Solution.to_csv": partial(solution.to_csv, "a.csv", degrees=True, units={}),
-        "Solution.to_pandas": partial(solution.to_pandas, fourbar.units("mm")),
+        "Solution.to_pandas": partial(solution.to_pandas, units("mm")),
         "Sensitivity.of": partial(sensitivity.of, "torque", "motion.omega_2"),
         "Sensitivity.value": partial(sensitivity.value, "torque"),
     }
@@ -324,7 +323,7 @@ def test_a_command_on_no_branch_is_refused(wrong):
     for row in (np.array([wrong]), np.array([1, wrong])):
         at = command._replace(angle=command.theta_2[: len(row)], branch=row)
         with raises(InputError, match=r"at\.branch = .*must be \+1"):
-            fourbar.solve(scene, at=at)
+            solve(scene, at=at)
 
 
 @mark.parametrize(
@@ -333,14 +332,14 @@ def test_a_command_on_no_branch_is_refused(wrong):
 def test_a_command_of_another_shape_is_refused(wrong):
     scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
     with raises(InputError, match=r"must be numbers, shape \(2,\)"):
-        fourbar.solve(scene, at=fourbar.command(scene)._replace(**wrong))
+        solve(scene, at=fourbar.command(scene)._replace(**wrong))
 
 
 def test_the_sign_of_the_branch_is_that_of_the_pose():
     """Beyond its change point a kite has the other sign in the same assembly."""
     kite = Scene(uniform(1.0, 2.0, 1.0, 2.0), Motion(np.array([1.0, 4.0])))
     pin = {"A": np.empty((2, 2))}
-    whole = fourbar.solve(kite)
+    whole = solve(kite)
     assert whole.branch.tolist() == np.sign(whole.sin_mu).tolist() == [1, -1]
     at = fourbar.command(kite)
-    assert fourbar.solve(kite, at=at, out=pin).branch.tolist() == [1, -1]
+    assert solve(kite, at=at, out=pin).branch.tolist() == [1, -1]

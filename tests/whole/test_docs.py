@@ -14,6 +14,7 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import fourbar
+from fourbar import solve, swing
 from fourbar.cli import group, status
 from fourbar.effects import list_kinds
 from fourbar.errors import FAILED, HOLDS
@@ -144,7 +145,7 @@ def test_the_scene_file_is_one(checkout):
     assert steel.mass == approx(7850.0 * 0.02 * 0.005 * steel.length)
     (checkout / "example.toml").write_text(text)
     scene = fourbar.load(checkout / "example.toml")
-    assert set(fourbar.solve(scene).status) == {"ok"}
+    assert set(solve(scene).status) == {"ok"}
     assert {effect.key for effect in scene.effects} <= list_kinds().keys()
 
 
@@ -329,7 +330,7 @@ def test_the_gallery_is_a_suite_with_pictures_and_sources():
     assert names == sorted(path.stem for path in GALLERY.glob("*.toml"))
     for name in names:
         scene = shown(name)
-        assert set(fourbar.solve(scene, "force").status) == {"ok"}
+        assert set(solve(scene, "force").status) == {"ok"}
         assert len(scene.source) > 100
         assert (DOCS / "gallery" / f"{name}.svg").is_file()
         assert f"gallery/{name}.svg" in read("docs/gallery.md")
@@ -340,11 +341,11 @@ def shown(name):
 
 
 def test_the_pump_jack_has_a_stroke_of_54_inches():
-    assert fourbar.swing(shown("pump_jack").linkage) * 72.0 == approx(54.0, rel=0.03)
+    assert swing(shown("pump_jack").linkage) * 72.0 == approx(54.0, rel=0.03)
 
 
 def test_the_cylinder_of_the_bucket_has_the_stroke_of_its_source():
-    stroke = fourbar.solve(shown("excavator_bucket")).stroke
+    stroke = solve(shown("excavator_bucket")).stroke
     assert [round(float(end), 1) for end in (stroke.min(), stroke.max())] == [1.3, 2.1]
 
 
@@ -356,18 +357,18 @@ def test_the_tailgate_has_one_unstable_equilibrium_that_is_held():
 
 def test_the_wiper_goes_60_degrees_to_and_fro_in_the_same_time():
     wiper = shown("wiper").linkage
-    assert math.degrees(fourbar.swing(wiper)) == approx(60.0, rel=1e-8)
+    assert math.degrees(swing(wiper)) == approx(60.0, rel=1e-8)
     assert fourbar.time_ratio(wiper) == approx(1.0, rel=1e-8)
 
 
 def test_the_landing_gear_ends_plumb_under_O4():
-    first, *_, last = fourbar.solve(shown("landing_gear")).points["foot"]
+    first, *_, last = solve(shown("landing_gear")).points["foot"]
     assert first == approx([-0.250962, -0.162331], abs=2e-5)  # D of the source
     assert last == approx([0.654038, -1.067331], abs=3e-4)
 
 
 def test_the_second_crank_of_the_pump_goes_240_to_375_times_a_minute():
-    speed = fourbar.solve(shown("double_crank_pump")).omega_4 / math.tau * 60.0
+    speed = solve(shown("double_crank_pump")).omega_4 / math.tau * 60.0
     assert (speed.min(), speed.max()) == approx((240.0, 375.0), rel=1e-3)
 
 

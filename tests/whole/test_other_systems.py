@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from pytest import fixture, mark
 
-import fourbar
+from fourbar import load
 from fourbar.cli import status
 from fourbar.errors import HOLDS
 from fourbar.files import save
@@ -35,7 +35,7 @@ def folder(tmp_path):
     """A folder whose name takes more than ASCII, with a scene whose title does."""
     scene_folder = tmp_path / "Análisis de θ"
     scene_folder.mkdir()
-    model = fourbar.load(ROOT / "models" / "crank_rocker.toml")
+    model = load(ROOT / "models" / "crank_rocker.toml")
     linkage = replace(model.linkage, output=replace(model.linkage.output, mass=0.36))
     scene = replace(model, linkage=linkage, title="Mécanique, θ₂", source="")
     save(scene, scene_folder / "scène.toml")
@@ -73,11 +73,11 @@ def test_commands_need_neither_fork_nor_utf_8(module, line, folder):
 def test_line_ends_of_windows_are_read(folder, capsys):
     scene, table = folder / "scène.toml", folder / "table.csv"
     assert status(["analyze", str(scene), "--csv", "-o", str(table)]) == HOLDS
-    before = fourbar.load(scene)
+    before = load(scene)
     for file in (scene, table):
         assert b"\r" not in file.read_bytes()
         file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
-    assert fourbar.load(scene) == before
+    assert load(scene) == before
     capsys.readouterr()
     assert harness(["check", str(scene), str(table)]) == HOLDS
     assert "numbers agree" in capsys.readouterr().out

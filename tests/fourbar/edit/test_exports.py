@@ -5,8 +5,7 @@ from dataclasses import replace
 
 from pytest import importorskip, mark
 
-import fourbar
-from fourbar import solve
+from fourbar import load, solve
 from fourbar.show.shown_units import COMMON
 
 importorskip(
@@ -30,7 +29,7 @@ UNBOUNDED = ("thesis", "capabilities/cylinder_1_4", "capabilities/cylinder_1_2")
 
 def load_coarse(name):
     """Load a scene with a tenth of its positions, between which its peaks lie."""
-    scene = fourbar.load(MODELS / f"{name}.toml")
+    scene = load(MODELS / f"{name}.toml")
     steps = max(len(solve(scene, "position")) // 10, 12)
     coarse = replace(scene.motion.angle, steps=steps)
     return replace(scene, motion=scene.motion.replace(angle=coarse))
@@ -59,7 +58,7 @@ def test_the_headline_says_that_dry_friction_at_rest_is_left_out():
     slow_but({"thesis"}, UNBOUNDED),
 )
 def test_what_grows_without_bound_is_no_number(name):
-    data = evaluate_scene(fourbar.load(MODELS / f"{name}.toml"), COMMON, settled=True)
+    data = evaluate_scene(load(MODELS / f"{name}.toml"), COMMON, settled=True)
     drive, pins, _ = data["headline"].split("; ")
     assert re.fullmatch("peak (torque|drive force) grows without bound", drive)
     assert re.match("largest pin force grows without bound at O2", pins)
@@ -70,7 +69,7 @@ def test_what_grows_without_bound_is_no_number(name):
 @mark.slow
 def test_a_balanced_drive_has_no_peak_of_rounding():
     """Nothing acts on this linkage at a constant speed but inertia, which is zero."""
-    scene = fourbar.load(MODELS / "capabilities/parallelogram.toml")
+    scene = load(MODELS / "capabilities/parallelogram.toml")
     gravity_only = replace(scene, effects=(), loads=())
     assert evaluate_scene(gravity_only, COMMON, settled=True)["peaks"]["torque"] == 0.0
     headline = evaluate_scene(gravity_only, COMMON)["headline"]

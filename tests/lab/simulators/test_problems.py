@@ -3,12 +3,12 @@ that share no code with them.
 """
 
 import json
-import math
 import os
 import re
 import runpy
 from dataclasses import replace
 from functools import cache
+from math import isclose, nan, pi, sin, sqrt
 
 import numpy as np
 from jsonschema import Draft202012Validator
@@ -203,21 +203,21 @@ def pendulum(problem):
         inertia += bar.get("inertia", mass * length**2 / 12.0) + mass * arm**2
         moment += mass * arm
     k = scene["effects"]["gravity"][0] * moment / inertia
-    return k, start["omega_2"] ** 2 / 2.0 + k * math.sin(start["theta_2"])
+    return k, start["omega_2"] ** 2 / 2.0 + k * sin(start["theta_2"])
 
 
 def test_gazebos_four_bar_swings_as_a_pendulum():
     problem = read_stored("gz_physics_987")
     answers, errors = problem["answers"], problem["errors"]
-    rate = math.sqrt(pendulum(problem)[0])
-    modulus = math.sin(0.5 * (problem["command"]["theta_2"] + 0.5 * math.pi))
+    rate = sqrt(pendulum(problem)[0])
+    modulus = sin(0.5 * (problem["command"]["theta_2"] + 0.5 * pi))
     quarter = special.ellipk(modulus**2)
     apart = abs(answers["frequency"] - rate / (4.0 * quarter))
     assert apart <= errors["frequency"] < 1e-9
     assert f"{answers['frequency']:.10f}" == "0.7504113317"
     phase = quarter - rate * np.asarray(problem["times"])
     sn, cn, _, _ = special.ellipj(phase, modulus**2)
-    theta = 2.0 * np.arcsin(modulus * sn) - 0.5 * math.pi
+    theta = 2.0 * np.arcsin(modulus * sn) - 0.5 * pi
     omega = -2.0 * modulus * rate * cn
     forces = solve_pin_forces(problem, theta, omega)
     assert_agreement("gz_physics_987", {"theta_2": theta, "omega_2": omega} | forces)
@@ -234,7 +234,7 @@ def test_a02_passes_every_angle_when_energy_says():
     assert len(time) == 401 and time[-1] == 20.0
 
     def seconds_per_radian(x):
-        return -1.0 / math.sqrt(2.0 * (energy - k * math.sin(x)))
+        return -1.0 / sqrt(2.0 * (energy - k * sin(x)))
 
     accuracy = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
     reached = 0.0
@@ -300,7 +300,7 @@ def test_the_proposed_problem_rests_and_swings_as_its_page_says():
         rate = mp.sqrt(stiffness / inertia - decay**2)
         frequency = mp.sqrt(stiffness / inertia) / (2 * mp.pi)
     assert abs(rest.place.theta_2 - float(angle)) < 1e-12
-    assert math.isclose(rest.frequency, frequency, rel_tol=1e-9)
+    assert isclose(rest.frequency, frequency, rel_tol=1e-9)
     for text in (
         f"{float(angle):.12f}",
         f"{float(frequency):.6f}",
@@ -340,7 +340,7 @@ def spoil(error):
         ([1.0], "-"),
         ("x", "-"),
         ([[1.0, 2.0]] * 37, "-"),
-        ([math.nan] * 37, "-"),
+        ([nan] * 37, "-"),
     ],
 )
 def test_a_level_is_that_of_the_worst_position(torque, level):

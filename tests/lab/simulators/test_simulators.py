@@ -4,9 +4,9 @@ What each is given, how a run is laid out, what is judged of its answer.
 """
 
 import json
-import math
 import re
 from importlib.util import find_spec
+from math import remainder, tau
 
 import numpy as np
 from pytest import approx, fixture, importorskip, mark
@@ -92,7 +92,7 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
         formulas = r"fourbar(\.| import .*)(solving|formulas)"
         assert not re.search(formulas, path.read_text()), path
     scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
-    for branch, first in ((1, math.tau), (-1, 0.0)):
+    for branch, first in ((1, tau), (-1, 0.0)):
         moved = recommand(scene, branch=branch, speed=-10.0 * branch)
         begin = protocol_engines.start(moved)
         assert write_mjcf(moved, start=begin).count("<key ") == 1
@@ -113,8 +113,8 @@ def test_beyond_a_change_point_a_simulator_starts_in_the_assembly_that_is_stated
     ):
         theta_2, of_3_to_2, theta_4 = qpos
         level = theta_2 + of_3_to_2 - scene.linkage.ground_angle
-        assert abs(math.remainder(theta_4 - theta_2, math.tau)) < 1e-12
-        assert abs(math.remainder(level, math.tau)) < 1e-12
+        assert abs(remainder(theta_4 - theta_2, tau)) < 1e-12
+        assert abs(remainder(level, tau)) < 1e-12
 
 
 @mark.usefixtures("sealed")

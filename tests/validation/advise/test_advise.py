@@ -12,7 +12,7 @@ import numpy as np
 from click.testing import CliRunner
 from pytest import MonkeyPatch, approx, fixture, mark, raises
 
-import fourbar
+from fourbar import InputError, Motion, dump, load
 from fourbar.scene import Command
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise import advise, matters
@@ -37,7 +37,7 @@ def call(tmp_path):
     def run(scenes, *options):
         files = [str(tmp_path / f"{name}.toml") for name in scenes]
         for file, scene in zip(files, scenes.values(), strict=True):
-            Path(file).write_text(fourbar.dump(scene))
+            Path(file).write_text(dump(scene))
         line = [*files, "--error", *options]
         done = CliRunner().invoke(advise.advise_command, line, standalone_mode=False)
         return done.return_value, " ".join(done.output.split()), done
@@ -87,7 +87,7 @@ def test_a_drive_elsewhere_is_judged_between_the_steps_too():
     """Fourteen steps a turn hold the torque of bar 4 within 0.7 % at the steps, and
     miss 9 % between them.
     """
-    scene = fourbar.load(MODELS / "drag_link.toml")
+    scene = load(MODELS / "drag_link.toml")
     trial = JudgedSetup(scene).try_out(advise.make_settings(14.0, 3.0))
     assert compute_errors(scene, trial.at, trial.quantities).worst < 0.01
     assert matters.judge_trial(scene, trial).worst > 0.05
@@ -108,7 +108,7 @@ def test_no_curve_is_drawn_through_a_pole():
     [("double_rocker", 1000), ("triple_rocker", 1000), ("thesis", 1600)],
 )
 def test_figures_of_rockers_and_the_thesis(name, most):
-    advice = advise.advise(fourbar.load(MODELS / f"{name}.toml"), 1e-5)
+    advice = advise.advise(load(MODELS / f"{name}.toml"), 1e-5)
     assert advice.reached, advice.reason
     assert max(advice.best.steps, advice.best.steps_per_revolution) <= most
 
@@ -140,7 +140,7 @@ def test_the_file_alone_keeps_the_error(tmp_path, call):
 @mark.slow
 def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch, call):
     monkeypatch.setattr(advise, "MOST_STEPS_OF_A_RUN", 1500)
-    still = replace(turning(), motion=fourbar.Motion(1.0, 10.0))
+    still = replace(turning(), motion=Motion(1.0, 10.0))
     out = tmp_path / "none.xml"
     for scene, error, words in (
         (turning(positions=12), "1e-14", ("No setting of plain MJCF", "inverse dyn")),
@@ -162,7 +162,7 @@ def test_a_predicted_error_that_is_no_number_is_no_small_one():
 @mark.parametrize("required", [0.0, 1.0, -1e-3, math.nan])
 def test_an_error_is_between_0_and_1(required):
     for ask, asked in ((advise.advise, turning()), (adjust_engines, ENGINES)):
-        with raises(fourbar.InputError, match="above 0 and below 1"):
+        with raises(InputError, match="above 0 and below 1"):
             ask(asked, required)
 
 
@@ -235,7 +235,7 @@ def test_the_time_of_an_attempt_is_that_of_its_steps_and_readings():
 
 @mark.slow
 def test_several_scenes_have_one_table(call):
-    still = replace(turning(10.0, 36), motion=fourbar.Motion(1.0, 1.0))
+    still = replace(turning(10.0, 36), motion=Motion(1.0, 1.0))
     scenes = {"one": turning(10.0, 36), "still": still}
     status, printed, done = call(scenes, "1e-4")
     assert status == 1  # one of them cannot be run through

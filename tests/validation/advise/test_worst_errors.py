@@ -1,6 +1,6 @@
 """Errors that the advice goes by, of answers that are off by a known part."""
 
-import math
+from math import inf, nan
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,10 +52,10 @@ def test_each_error_is_the_part_that_an_answer_is_off(name, part):
 
 def test_what_is_no_number_is_no_small_error():
     for name in ("torque", "F32"):
-        errors = compute_errors(SCENE, COMMAND, answer(**{name: math.nan}))
-        assert getattr(errors, name) == errors.worst == math.inf
-    assert find_greatest([0.0, math.nan]) == find_greatest([]) == math.inf
-    lost = COMMAND._replace(angle=np.full(40, math.nan))
+        errors = compute_errors(SCENE, COMMAND, answer(**{name: nan}))
+        assert getattr(errors, name) == errors.worst == inf
+    assert find_greatest([0.0, nan]) == find_greatest([]) == inf
+    lost = COMMAND._replace(angle=np.full(40, nan))
     assert compute_errors(SCENE, lost, answer()) == INFINITE_ERRORS
 
 

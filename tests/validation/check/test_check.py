@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from functools import partial
+from math import cos, hypot, pi, radians, sin
 
 import numpy as np
 from pytest import approx, fixture, mark
@@ -191,7 +192,7 @@ def units(*names, factor):
 
 def in_axes(degrees, of_y=1.0, names=PIN_FORCES, factor=1.0):
     """State vectors in axes that are turned, whose y may be reversed."""
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    c, s = cos(radians(degrees)), sin(radians(degrees))
     axes = factor * np.array([(c, -of_y * s), (s, of_y * c)])
     return changed(lambda right: {name: right[name] @ axes for name in names})
 
@@ -249,8 +250,8 @@ def centred(change):
 
     def change_bar(bar):
         r, phi = bar.mass_centre
-        x, y = change(bar.length, r * math.cos(phi), r * math.sin(phi))
-        return replace(bar, centre=(math.hypot(x, y), math.atan2(y, x)))
+        x, y = change(bar.length, r * cos(phi), r * sin(phi))
+        return replace(bar, centre=(hypot(x, y), math.atan2(y, x)))
 
     return change_bar
 
@@ -347,13 +348,13 @@ crank_rocker | degrees where radians | theta_3 theta_4 | 57.29577951308232
 crank_rocker | in radians where degrees | theta_2 | 0.017453292519943295
 """)
 """Scene, words, quantities and the factor on them: of kgf 1 / 9.80665."""
-RPM = math.pi / 30.0
+RPM = pi / 30.0
 OF_A_BAR = {
     ": mass centre measured from the wrong pin": centred(lambda d, x, y: (d - x, y)),
     ": mass centre taken at mid-bar": centred(lambda d, x, y: (d / 2.0, 0.0)),
     ".centre reversed": centred(lambda d, x, y: (-x, -y)),
     ".centre.1 reversed": centred(lambda d, x, y: (x, -y)),
-    ".centre.1 left out": centred(lambda d, x, y: (math.hypot(x, y), 0.0)),
+    ".centre.1 left out": centred(lambda d, x, y: (hypot(x, y), 0.0)),
     ": inertia about the pin": steiner,
     ".mass left out": scaled(mass=0.0),
 }
@@ -379,7 +380,7 @@ IN_THESIS = {
         for done, x in {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}.items()
     },
     "loads.0.force 0.1 times ours": loads_times(0.1, 1.0),
-    "theta_4 or": changed(lambda right: {"theta_4": right["theta_4"] + math.pi}),
+    "theta_4 or": changed(lambda right: {"theta_4": right["theta_4"] + pi}),
     "relative to bar 3": relative_to("theta_3"),
     "F32 and F43 are exchanged": changed(
         lambda right: {"F32": right["F43"], "F43": right["F32"]}
@@ -410,9 +411,9 @@ IN_CRANK_ROCKER = {
         for words, factor in {
             "rev/min taken for rad/s": 1.0 / RPM,
             "rad/s taken for rev/min": RPM,
-            "rev/s taken for rad/s": 0.5 / math.pi,
+            "rev/s taken for rad/s": 0.5 / pi,
             "deg/s taken for rad/s": math.degrees(1.0),
-            "rad/s taken for deg/s": math.radians(1.0),
+            "rad/s taken for deg/s": radians(1.0),
         }.items()
     },
     **{
@@ -446,11 +447,9 @@ IN_CRANK_ROCKER = {
     "m a and I alpha in kg cm/s^2": inertial(100.0, 100.0),
     "m a in kg mm/s^2": inertial(1e3, 1.0),
     "d'Alembert": inertial(-1.0, -1.0),
-    "from another zero: theta_2 +37 deg": shifted(
-        lambda theta: theta + math.radians(37.0)
-    ),
+    "from another zero: theta_2 +37 deg": shifted(lambda theta: theta + radians(37.0)),
     "from another zero: theta_2 -118 deg": shifted(
-        lambda theta: theta - math.radians(118.0)
+        lambda theta: theta - radians(118.0)
     ),
     "read as degrees": shifted(np.radians),
     "relative to bar 2": relative_to("theta_2"),
@@ -484,7 +483,7 @@ MISTAKES = {
         "forces are in the frame of bar 1": in_axes(math.degrees(0.3)),
         "alpha_2 is left out": solved(acceleration=0.0),
         "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
-        "alpha_2 in rad/s^2 taken for": solved(acceleration=math.radians(30.0)),
+        "alpha_2 in rad/s^2 taken for": solved(acceleration=radians(30.0)),
     },
     "load_in_the_world": {
         "loads.1 (bar 3): its direction turns with": solved(in_other_frame)
@@ -789,7 +788,7 @@ def test_positions_that_do_not_assemble_are_named_by_their_line(read, check):
     assert check(THESIS, "theta_2,torque\n\n0.8,1\n")[0] == FAILED
     both = (right(THESIS)[f"theta_{bar}"][0] for bar in (2, 3))
     right_row = ",".join(repr(float(angle)) for angle in both)
-    table = read(f"theta_2,theta_3\n{right_row}\n{math.radians(45.0)!r},1\n")
+    table = read(f"theta_2,theta_3\n{right_row}\n{radians(45.0)!r},1\n")
     judgement = Judgement(THESIS, table)
     assert judgement.not_assembled == [3] and judgement.status == FAILED
     assert [finding.line for finding in judgement.findings] == [2]
@@ -1107,12 +1106,12 @@ def test_what_brings_one_number_nearer_and_no_other_is_no_explanation(check):
     linkage = fourbar.FourBar(
         2.22,
         Bar(1.0, input_mass, 0.82),
-        Bar(2.06, 219.95674411, 10.35, (1.6476, math.radians(-18.7352))),
+        Bar(2.06, 219.95674411, 10.35, (1.6476, radians(-18.7352))),
         Bar(2.33, output_mass, 50.13),
     )
-    load = Load(3, (100.0, math.pi / 2.0), from_pin=(3.06, math.radians(-31.0)))
+    load = Load(3, (100.0, pi / 2.0), from_pin=(3.06, radians(-31.0)))
     code, printed, _ = check(
-        Scene(linkage, Motion(math.radians(60.0), 10.0, 5.0), loads=(load,)),
+        Scene(linkage, Motion(radians(60.0), 10.0, 5.0), loads=(load,)),
         "theta_2 [deg],torque [N m],F12 [N],F32 [N],F43 [N],F14 [N]\n"
         "60,14271.89,23647.43,24055.14,7798.85,7515.91\n",
     )

@@ -3,14 +3,13 @@
 The second derivation of a position is the intersection of two circles.
 """
 
-import math
 from dataclasses import replace
+from math import pi, radians
 
 import numpy as np
 from pytest import fixture, mark, raises
 
-import fourbar
-from fourbar import Motion, Sweep, solve
+from fourbar import Gravity, Motion, Rise, Sine, Sweep, solve, uniform
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import Judgement
@@ -60,7 +59,7 @@ def judged(read):
 
 def commanding(bar, first, last, steps=8):
     """A crank-rocker whose bar `bar` is commanded and driven over a range in deg."""
-    sweep = Sweep(math.radians(first), math.radians(last), steps)
+    sweep = Sweep(radians(first), radians(last), steps)
     names = (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
     motion = Motion(**dict(zip(names, (sweep, 2.0, -1.0), strict=True)))
     return replace(crank_rocker(motion=motion), drive_bar=bar)
@@ -80,7 +79,7 @@ def test_a_table_of_the_commanded_bar_is_judged(bar, ends, same, judged):
     solution = solve(at)
     assert set(solution.status) == {"ok"}
     name = f"theta_{bar}"
-    faster = solve(recommand(at, speed=2.0 * 30.0 / math.pi))
+    faster = solve(recommand(at, speed=2.0 * 30.0 / pi))
     torques = solution.torque, -solution.torque, faster.torque
     good, bad, slip = (judged(scene, name, angles, torque) for torque in torques)
     assert good.status == HOLDS and good.compared == len(angles)
@@ -124,7 +123,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(
     name, form, shift, read
 ):
     """A sweep of steps of 20/3 deg, and times along a law; 47 deg is none of it."""
-    swept = crank_rocker(motion=Motion(Sweep(0.0, math.radians(120.0), 18), 10.0))
+    swept = crank_rocker(motion=Motion(Sweep(0.0, radians(120.0), 18), 10.0))
     for scene in (swept, SERVO)[: 1 + (name == "time")]:
         right = solve(scene)
         places = np.degrees(right.theta_2)
@@ -150,7 +149,7 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judge
     angles = find_row_commands(scene, table).at.angle
     apart = np.angle(np.exp(1j * (angles - find_crank(scene, theta_4, side))))
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
-    turned = math.radians(ends[0]) - 0.1, math.radians(ends[1]) + 0.1
+    turned = radians(ends[0]) - 0.1, radians(ends[1]) + 0.1
     assert ((angles > turned[0]) & (angles < turned[1])).all()
     torque = solve(scene, at=at_angles(angles)).torque
     assert judged(scene, "theta_4", theta_4, torque, "{:.0f}").status == HOLDS
@@ -175,9 +174,9 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
 
 
 def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
+    linkage = uniform(0.3, 0.1, 0.3, 0.1)
     motion = Motion(Sweep(0.1, 4.1, 20), 5.0)
-    scene = Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    scene = Scene(linkage, motion, effects=(Gravity(),))
     angles = np.radians([20.0, 100.0, 200.0, 250.0, 340.0])
     expected = (0.1 + 0.3) * 9.81 * 0.1 * np.cos(angles)
     assert judged(scene, "theta_4", angles, expected, "{:.0f}").status == HOLDS
@@ -235,15 +234,15 @@ torque | torque | torque | 1 | .15g
 }
 """Name of a column, what is in it, its heading, a factor and how it is written."""
 SERVO = crank_rocker(
-    motion=Motion(law=fourbar.Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")),
+    motion=Motion(law=Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")),
     title="Servo",
 )
 
 
 def follow_rise(time):
     """Return angle and rates of 10 u^3 - 15 u^4 + 6 u^5, by hand, and the torque."""
-    u, h = time / 0.8, math.radians(120.0)
-    theta = math.radians(20.0) + h * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+    u, h = time / 0.8, radians(120.0)
+    theta = radians(20.0) + h * u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
     omega = h / 0.8 * 30.0 * u * u * (1.0 - 2.0 * u + u * u)
     alpha = h / 0.64 * 60.0 * u * (1.0 - 3.0 * u + 2.0 * u * u)
     at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
@@ -286,7 +285,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, said, read):
 def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
     scene = crank_rocker(motion=Motion(theta.tolist(), speed))
-    time = (theta - math.radians(start)) / speed
+    time = (theta - radians(start)) / speed
     judgement = Judgement(scene, read(write("time,torque", time, solve(scene).torque)))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
 
@@ -327,12 +326,12 @@ def test_a_table_without_an_angle_names_the_commanded_one(read):
 
 @mark.parametrize("decimals, rounded", [(1, True), (15, False)])
 def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, rounded, read):
-    law = fourbar.Sine(1.0, 0.5, 2.0 * math.pi, 1.0, 0.1 * math.pi)  # its peak: 0.2 s
+    law = Sine(1.0, 0.5, 2.0 * pi, 1.0, 0.1 * pi)  # its peak: 0.2 s
     scene = crank_rocker(motion=Motion(law=law))
     times = np.array([0.05, 0.12, 0.22, 0.31, 0.47])
     theta, omega, alpha = law.at(times)
     at = at_angles(theta)._replace(speed=omega, acceleration=alpha)
-    columns = np.round(times, decimals), theta, fourbar.solve(scene, at=at).torque
+    columns = np.round(times, decimals), theta, solve(scene, at=at).torque
     rows = [",".join(map(repr, row)) for row in np.transpose(columns).tolist()]
     table = read("\n".join(["time,theta_2,torque", *rows, ""]))
     if rounded:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from pytest import approx, importorskip, mark
 
-import fourbar
+from fourbar import Motion, Sweep, solve, uniform
 from fourbar.quantities import PIN_FORCES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, Comparison, Demands
@@ -22,10 +22,8 @@ from tests.support.rows import read_rows
 from tests.support.scenes import balance, crank_rocker
 
 POSITIONS = 40
-SCENE = crank_rocker(
-    motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, POSITIONS - 1), 10.0, 5.0)
-)
-FORMULAS = fourbar.solve(SCENE)
+SCENE = crank_rocker(motion=Motion(Sweep(0.1, 5.9, POSITIONS - 1), 10.0, 5.0))
+FORMULAS = solve(SCENE)
 FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
 
 
@@ -122,8 +120,8 @@ def test_an_engine_that_closes_elsewhere_fails_either_way():
     for torque in (FORMULAS.torque, moved("torque", FIRST, math.nan)):
         rows = compare(make_answer(np.arange(POSITIONS) != FIRST, torque=torque))
         assert list_failing(rows) == {"assembled"}
-    longer = crank_rocker(linkage=fourbar.uniform(0.3, 0.25, 0.1, 0.22))
-    solution = fourbar.solve(longer, "position")
+    longer = crank_rocker(linkage=uniform(0.3, 0.25, 0.1, 0.22))
+    solution = solve(longer, "position")
     assert not solution.assembled.all()
     answer = Answer("other", "exact", solution.at, np.ones(len(solution), dtype=bool))
     assert compare(answer, longer, solution, ())["assembled"].failed
@@ -151,7 +149,7 @@ def test_a_balanced_crank_agrees_and_a_slip_of_1e_9_does_not(left):
     are not multiplied by them once more, which would excuse 1e-6.
     """
     scene = balance(left)
-    formulas = fourbar.solve(scene, "force")
+    formulas = solve(scene, "force")
     answer = FreeBody().answer(scene, formulas.at)
     rows = compare(answer, scene, formulas)
     assert {row.verdict for row in rows.values()} == {AGREES}

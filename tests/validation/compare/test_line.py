@@ -6,7 +6,7 @@ Every pair of bars holds, faults show, who cannot do it says so.
 import numpy as np
 from pytest import approx, mark, skip
 
-import fourbar
+from fourbar import Friction, Gravity, Motion, command, solve
 from fourbar.effects import LinearDrive, Place
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
@@ -29,15 +29,15 @@ EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
     if missing := engine.missing():
         skip(missing)
-    at = crank_rocker(motion=fourbar.Motion(1.0))
-    linkage, (theta_4,) = at.linkage, fourbar.solve(at, "position").theta_4
+    at = crank_rocker(motion=Motion(1.0))
+    linkage, (theta_4,) = at.linkage, solve(at, "position").theta_4
     on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
     near = Place(1, (abs(on_bar + gap), np.angle(on_bar + gap)))
     scene = crank_rocker(
-        motion=fourbar.Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
+        motion=Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
         drive=LinearDrive(near, Place(4, (0.2, 0.4))),
     )
-    assert fourbar.solve(scene, "position").stroke == approx(gap, rel=0.5)
+    assert solve(scene, "position").stroke == approx(gap, rel=0.5)
     rows = judge_by(engine, scene)
     for quantity in ("stroke", "drive_line", "stroke_speed", "drive_force", "F14"):
         row = rows[quantity]
@@ -55,7 +55,7 @@ JUDGED = {
     "statics and friction at rest": (
         (1, 3),
         {"speed": 0.0, "acceleration": 0.0},
-        {"effects": (fourbar.Gravity(), fourbar.Friction.at(A=0.05, O4=0.02))},
+        {"effects": (Gravity(), Friction.at(A=0.05, O4=0.02))},
         {"drive_force_low", "drive_force_high"},
     ),
 }
@@ -65,7 +65,7 @@ JUDGED = {
 @mark.parametrize("what", JUDGED)
 def test_what_is_stated_of_a_line_is_judged(what):
     pair, motion, acting, quantities = JUDGED[what]
-    scene = driven(*pair, 1, **{"effects": (fourbar.Gravity(),)} | acting)
+    scene = driven(*pair, 1, **{"effects": (Gravity(),)} | acting)
     rows = judge("", recommand(scene, **motion), [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
     agreeing = {row.quantity for row in rows if row.verdict == AGREES}
@@ -82,7 +82,7 @@ def test_what_is_stated_of_a_line_is_judged(what):
 )
 def test_of_a_line_is_due_what_takes_the_place_of_an_answer_or_follows(answered, due):
     scene = driven(1, 4, 1, ())
-    solution = fourbar.solve(scene)
+    solution = solve(scene)
     numbers = {name: np.array(solution[name]) for name in answered - {"torque"}}
     answer = Answer("theirs", "exact", solution.at, solution.assembled, numbers)
     held = Demands(EQUIVALENCE, tuple(answered))
@@ -98,11 +98,11 @@ def test_who_cannot_do_it_refuses_in_one_line_that_names_it():
         1,
         4,
         1,
-        (fourbar.Gravity(),),
+        (Gravity(),),
     )
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))
     for engine, words in (
         (BallArithmetic(), "a drive that exerts a force"),
         (outside, "hello does not list gravity, loads, cylinder in effects"),
     ):
-        assert words in engine.answer(scene, fourbar.command(scene)).refusal
+        assert words in engine.answer(scene, command(scene)).refusal

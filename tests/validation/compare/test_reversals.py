@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import Bar, FourBar, Friction, Scene, solve
 from fourbar.scene.motion import Motion, Sweep
 from fourbar_validation.compare.reversals import mark_reversing
 from fourbar_validation.run.judge import judge
@@ -14,16 +14,12 @@ from tests.support.here import EXACT
 
 D, A, B, C = 0.3, 0.1, 0.25, 0.22
 FRICTION = 0.5
-LINKAGE = fourbar.FourBar(
-    D, fourbar.Bar(A, 0.2), fourbar.Bar(B, 0.5), fourbar.Bar(C, 0.4)
-)
+LINKAGE = FourBar(D, Bar(A, 0.2), Bar(B, 0.5), Bar(C, 0.4))
 
 
 def scene(pin, start=0.1):
     motion = Motion(Sweep(start, start + 2 * math.pi, 36), 10.0)
-    return fourbar.Scene(
-        LINKAGE, motion, effects=(fourbar.Friction.at(**{pin: FRICTION}),)
-    )
+    return Scene(LINKAGE, motion, effects=(Friction.at(**{pin: FRICTION}),))
 
 
 @pytest.mark.parametrize("start", [0.1, 0.0])
@@ -43,7 +39,7 @@ def test_only_a_pin_that_hardly_slips_reverses():
     slip = 1e-6
     x = np.array([0.0, 5.9e-6, 6.1e-6, 1e-3, 1.0])
     dry = replace(scene("A"), motion=Motion(Sweep(0.1, 0.5, 4), 2.0))
-    solved, ones = fourbar.solve(dry), np.ones(5)
+    solved, ones = solve(dry), np.ones(5)
 
     def find_reversals(omega_2, omega_3, omega_4, **how):
         speeds = {"omega_2": omega_2, "omega_3": omega_3, "omega_4": omega_4}

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from pytest import mark, raises
 
-import fourbar
+from fourbar import Motion, Sweep, save, solve
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.scene import Scene, command
 from fourbar_validation.cli import status
@@ -166,8 +166,8 @@ def find_verdicts(scene, *engines):
 
 def test_what_is_due_nowhere_is_not_counted_as_held(monkeypatch):
     """No loop closes beyond the limits of the input; or dry friction reverses."""
-    apart = Scene(ROCKER, fourbar.Motion(fourbar.Sweep(2.0, 4.0, 5), 1.0))
-    assert not fourbar.solve(apart).assembled.any()
+    apart = Scene(ROCKER, Motion(Sweep(2.0, 4.0, 5), 1.0))
+    assert not solve(apart).assembled.any()
     verdicts = find_verdicts(apart, FREE_BODY)
     assert verdicts["formulas", "closure"] == UNDECIDED
     assert verdicts["free-body", "torque"] == UNDECIDED
@@ -189,7 +189,7 @@ def test_formulas_without_an_answer_fail():
         "",
         scene,
         Echo(echo).answer(scene, commanded),
-        fourbar.solve(scene, "position", at=commanded),
+        solve(scene, "position", at=commanded),
         Demands(EQUIVALENCE, ("torque",)),
     ).rows()
     (row,) = [row for row in rows if row.quantity == "torque"]
@@ -204,7 +204,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     judge_here(monkeypatch)
     file, out = tmp_path / "scene.toml", tmp_path / "out"
     linkage = bare(4.0, 1.0, 3.0, 3.0)
-    fourbar.save(Scene(linkage, fourbar.Motion(math.radians(10.0), 1.0)), file)
+    save(Scene(linkage, Motion(math.radians(10.0), 1.0)), file)
     line = ["run", str(file), "--no-pictures", "--out", str(out), "--engines"]
     assert status([*line, "mujoco-simulated"]) == FAILED
     sentence = "Nothing was compared on 1 scene: 9 of the formulas' own identities hold"
@@ -271,7 +271,7 @@ def test_junit_skips_what_was_not_compared_and_fails_what_fails_as_before():
 
 def test_numbers_without_a_digit_do_not_agree(tmp_path, capsys):
     file, theirs = tmp_path / "scene.toml", tmp_path / "theirs.csv"
-    fourbar.save(NEAR_ITS_LIMIT, file)
+    save(NEAR_ITS_LIMIT, file)
     theirs.write_text(f"theta_2, torque\n{NEAR_ITS_LIMIT.motion.theta_2!r}, 17.0\n")
     assert status(["check", str(file), str(theirs)]) == FAILED
     told = "Nothing was compared; no digit left to judge 1 more by"

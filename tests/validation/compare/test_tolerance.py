@@ -3,7 +3,7 @@
 What a size of nothing demands, and that what is no number is never small.
 """
 
-import math
+from math import pi, tau
 
 import numpy as np
 from pytest import approx, mark
@@ -30,9 +30,9 @@ from tests.support.scenes import crank_rocker
 @mark.parametrize(
     "name, ours, theirs, apart",
     [
-        ("theta_3", math.pi - 0.25, -math.pi + 0.25, 0.5),
-        ("theta_3", 1.0, 1.0 + math.pi, math.pi),
-        ("theta_3", -3.0, 0.5, math.tau - 3.5),
+        ("theta_3", pi - 0.25, -pi + 0.25, 0.5),
+        ("theta_3", 1.0, 1.0 + pi, pi),
+        ("theta_3", -3.0, 0.5, tau - 3.5),
         ("omega_3", 1.0, 8.0, 7.0),
         ("F12", [4.0, 4.0], [1.0, 0.0], 5.0),
     ],

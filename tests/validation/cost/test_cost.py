@@ -5,10 +5,10 @@ stopped.
 """
 
 import json
-import math
 import re
 from dataclasses import replace
 from itertools import combinations
+from math import inf, pi, radians
 
 import numpy as np
 from click.testing import CliRunner
@@ -16,6 +16,7 @@ from pytest import approx, mark, raises
 from scipy.interpolate import make_interp_spline
 
 import fourbar
+from fourbar import Gravity, Motion, Scene, Sweep, dump, solve
 from fourbar.errors import LimitError
 from fourbar.scene import command, command_at
 from fourbar.show.plot.style import apply_style
@@ -45,10 +46,10 @@ def turning(omega=10.0, positions=36):
     """Return the crank-rocker a = 0.1, b = 0.25, c = 0.22, d = 0.3 m with gravity, over
     a revolution.
     """
-    return fourbar.Scene(
+    return Scene(
         CONTENDED_LINKAGE,
-        fourbar.Motion(fourbar.Sweep(0.0, 2.0 * math.pi, positions), omega),
-        effects=(fourbar.Gravity(),),
+        Motion(Sweep(0.0, 2.0 * pi, positions), omega),
+        effects=(Gravity(),),
     )
 
 
@@ -115,9 +116,9 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    sweep = fourbar.Sweep(math.radians(200.0), math.radians(340.0), 20)
-    motion = fourbar.Motion(sweep, 10.0, branch=-1)
-    scene = fourbar.Scene(linkage, motion, effects=(fourbar.Gravity(),))
+    sweep = Sweep(radians(200.0), radians(340.0), 20)
+    motion = Motion(sweep, 10.0, branch=-1)
+    scene = Scene(linkage, motion, effects=(Gravity(),))
     made = work_precision.CostStudy("past a change point", scene, tmp_path)
     assert tried(scene)(replace(BEST, steps_per_revolution=640)).worst < 1e-4
     assert all(p.errors.worst < 1e-11 for p in made._time_inverse())
@@ -134,9 +135,9 @@ def test_formulas_are_right_to_round_off(tmp_path):
 
 def test_a_drive_at_rest_has_no_small_error():
     still = replace(recommand(turning(positions=8), speed=0.0), drive_bar=4)
-    solution = fourbar.solve(still, "force")
+    solution = solve(still, "force")
     numbers = {name: solution[name] for name in ERROR_NAMES}
-    assert compute_errors(still, command(still), numbers).torque == math.inf
+    assert compute_errors(still, command(still), numbers).torque == inf
 
 
 def change(rung, **errors):
@@ -163,7 +164,7 @@ no longer the motion.
     [
         JUMPING,
         (*JUMPING[:5], 9e-2, *JUMPING[6:]),
-        (*JUMPING[:5], math.inf, *JUMPING[6:]),
+        (*JUMPING[:5], inf, *JUMPING[6:]),
     ],
 )
 def test_a_jump_in_one_pin_force_is_named_and_its_law_fails(jumping):
@@ -242,7 +243,7 @@ def measure(scene, out, *options):
 @mark.slow
 def test_the_command_writes_table_report_and_pictures(tmp_path, monkeypatch):
     scene = tmp_path / "small.toml"
-    scene.write_text(fourbar.dump(turning(positions=12)))
+    scene.write_text(dump(turning(positions=12)))
     few = {"RK4, tc held", "RK4, MuJoCo's defaults", "tolerance, Newton"}
     curves = [one for one in work_precision.design_curves(turning()) if one.name in few]
     monkeypatch.setattr(work_precision, "design_curves", lambda scene: curves)
@@ -270,7 +271,7 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
     tmp_path,
 ):
     scene, out = tmp_path / "law.toml", tmp_path / "out"
-    scene.write_text(fourbar.dump(FAULT_SCENES["law"]))
+    scene.write_text(dump(FAULT_SCENES["law"]))
     error = measure(scene, out).exception
     assert isinstance(error, fourbar.errors.LimitError) and "motion law" in str(error)
     assert not out.exists()
@@ -352,8 +353,8 @@ def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
 
 def miss_between(scene, count, degree):
     """Return the worst error between samples where the driven bar is far from rest."""
-    fine = np.linspace(0.0, 2.0 * math.pi, 4 * count + 1)
-    exact = fourbar.solve(scene, at=command_at(scene, fine))
+    fine = np.linspace(0.0, 2.0 * pi, 4 * count + 1)
+    exact = solve(scene, at=command_at(scene, fine))
     speed = np.abs(exact[f"omega_{scene.drive_bar}"])
     far = speed > 0.1 * speed.max()
     sampled = np.flatnonzero(far[::4])

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from pytest import approx, mark, param
 
-import fourbar
+from fourbar import Sweep, solve
 from fourbar.effects import (
     Effect,
     Friction,
@@ -149,7 +149,7 @@ def failures(name, case, every=1):
         "scene",
         case,
         answer,
-        fourbar.solve(case, "force", at=commanded),
+        solve(case, "force", at=commanded),
         Demands(EQUIVALENCE, COMPARED_QUANTITIES),
     )
     rows = [*comparison.rows(), comparison.closure()]
@@ -262,7 +262,7 @@ def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypa
         monkeypatch.setattr(module, start, lambda *sides, f=right: f(*sides) + 0.02)
     motion = Motion(**{commanded: np.linspace(0.05, 6.25, 40)})
     answer = answered(name, Scene(TRIPLE_ROCKER, motion))
-    right = fourbar.solve(Scene(TRIPLE_ROCKER, motion), "position")
+    right = solve(Scene(TRIPLE_ROCKER, motion), "position")
     np.testing.assert_array_equal(answer.assembled, right.assembled)
     assert right.assembled.any()
     for bar in {2, 3, 4} - {int(commanded[-1])}:
@@ -291,7 +291,7 @@ def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypa
 def test_a_loop_closes_on_its_change_points_and_beside(name, lengths, motion):
     """What rounds there must not leave it open: nothing would be compared."""
     scene = Scene(uniform(*lengths), Motion(**motion))
-    assert fourbar.solve(scene, "position").assembled.all()
+    assert solve(scene, "position").assembled.all()
     assert answered(name, scene).assembled.all()
 
 
@@ -408,8 +408,8 @@ LATER = 20.0 * math.pi
 COMMANDED = {
     "theta_3": (np.linspace(0.4, 0.8, 8) + LATER, 3.0, -2.0),
     "theta_4": (np.linspace(1.8, 2.5, 8) + LATER, 3.0, -2.0),
-    "stroke of bar 2": (fourbar.Sweep(0.25, 0.35, 8), 0.2, 0.1),
-    "stroke of bar 4": (fourbar.Sweep(0.33, 0.36, 8), 0.2, 0.1),
+    "stroke of bar 2": (Sweep(0.25, 0.35, 8), 0.2, 0.1),
+    "stroke of bar 4": (Sweep(0.33, 0.36, 8), 0.2, 0.1),
 }
 """Values and two rates of what is commanded."""
 CYLINDERS = {

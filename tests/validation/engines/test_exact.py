@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fourbar
+from fourbar import Motion, Scene, uniform
 from fourbar_validation.engines.description import find_stated_lengths
 from fourbar_validation.engines.exact import compute_exact_sines
 from fourbar_validation.run.identities import check_status
@@ -27,20 +28,20 @@ INCH = 0.0254
 )
 def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     """In their doubles the bars miss the line by the root of a rounding, 1e-8."""
-    linkage = fourbar.uniform(*(float(number) * unit for number in stated))
+    linkage = uniform(*(float(number) * unit for number in stated))
     scale = Fraction("0.0254") if unit == INCH else Fraction(1, 1000)
     exact = [Fraction(text) * scale for text in stated]
     assert find_stated_lengths(linkage.lengths) == exact
-    scene = fourbar.Scene(linkage, fourbar.Motion([0.0, math.pi], 1.0))
+    scene = Scene(linkage, Motion([0.0, math.pi], 1.0))
     command = fourbar.command(scene)
     assert np.nanmin(np.abs(compute_exact_sines(linkage, command))) < 1e-15
     d, *others = linkage.lengths
-    longer = fourbar.uniform(d, *(x * (1 + 1e-9) for x in others))
+    longer = uniform(d, *(x * (1 + 1e-9) for x in others))
     assert np.all(~(np.abs(compute_exact_sines(longer, command)) < 1e-6))
 
 
 def test_the_status_on_a_change_point_in_decimals_is_right():
-    linkage = fourbar.uniform(0.08, 0.1, 0.12, 0.06)
-    motion = fourbar.Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)
-    (row,) = check_status(make_question("s", fourbar.Scene(linkage, motion), ()))
+    linkage = uniform(0.08, 0.1, 0.12, 0.06)
+    motion = Motion(fourbar.Sweep(0.0, math.tau, 36), 10.0)
+    (row,) = check_status(make_question("s", Scene(linkage, motion), ()))
     assert row.passed and "1 change_point" in row.reason

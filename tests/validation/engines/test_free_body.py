@@ -1,12 +1,12 @@
 """The free bodies against levers, energy and 50 digits, never against the formulas."""
 
-import math
+from math import pi, prod, tau
 from pathlib import Path
 
 import numpy as np
 from pytest import approx, mark
 
-import fourbar
+from fourbar import Motion
 from fourbar.effects import Friction, Gravity, Load, Place, Spring, Springs, Torsion
 from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
@@ -34,21 +34,21 @@ def answered(scene):
     return answer.quantities
 
 
-@mark.parametrize("pin, begin", [("O4", 0.3), ("O2", 0.3 + 3.0 * math.tau)])
+@mark.parametrize("pin, begin", [("O4", 0.3), ("O2", 0.3 + 3.0 * tau)])
 def test_a_spring_is_wound_along_the_assembly_through_change_points(pin, begin):
     """Of a parallelogram bars 2 and 4 turn together: each winds by what bar 2 turns.
 
     Also where all positions have one sign, and change points lie between them.
     """
     rest = 0.1
-    for turned in (np.linspace(0.0, 2.0 * math.tau, 25), math.tau * np.arange(3)):
+    for turned in (np.linspace(0.0, 2.0 * tau, 25), tau * np.arange(3)):
         scene = Scene(
             RECTANGLE,
-            fourbar.Motion(begin + turned, 6.0),
+            Motion(begin + turned, 6.0),
             effects=(Torsion(((pin, 2.0, rest, 0.0),)),),
         )
         torque = ask_at(FreeBody(), scene, command(scene)).quantities["torque"]
-        wound = 0.2 + turned > math.pi
+        wound = 0.2 + turned > pi
         np.testing.assert_array_equal(np.isnan(torque), wound)
         due = 2.0 * (0.2 + turned)[~wound]
         np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
@@ -89,7 +89,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
 def test_at_rest_the_drive_takes_what_either_beginning_asks():
     """Bars 2 and 4 of a rectangle begin to turn together, and bar 3 not at all."""
     friction = Friction.at(O2=0.1, A=0.2, B=0.3, O4=0.4)
-    scene = Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), effects=(friction,))
+    scene = Scene(RECTANGLE, Motion(pi / 2, 0.0), effects=(friction,))
     got = answered(scene)
     ends = got["torque_low"][0], got["torque"][0], got["torque_high"][0]
     assert ends == approx((-1.0, 0.0, 1.0), abs=1e-14)
@@ -107,8 +107,8 @@ def test_a_lever_of_an_upright_rectangle(drive, forces):
 
     The bars are upright and 0.1 m long, and the coupler a two-force bar.
     """
-    load = Load(4, (10.0, 0.0), arm=(0.05, math.pi / 2))
-    got = answered(Scene(RECTANGLE, fourbar.Motion(math.pi / 2, 0.0), drive, (load,)))
+    load = Load(4, (10.0, 0.0), arm=(0.05, pi / 2))
+    got = answered(Scene(RECTANGLE, Motion(pi / 2, 0.0), drive, (load,)))
     assert got["torque"][0] == approx(1.0, abs=1e-14)
     for name, force in zip(("F12", "F32", "F43", "F14"), forces, strict=True):
         assert got[name][0] == approx(force, abs=1e-13), name
@@ -124,11 +124,11 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
 
     The sum over a period converges like n^-n. A drive of bar 4 has the same power.
     """
-    turn = np.arange(512) * (2.0 * math.pi / 512)
+    turn = np.arange(512) * (2.0 * pi / 512)
 
     def power(bar):
         scene = crank_rocker(
-            motion=fourbar.Motion(turn, 10.0),
+            motion=Motion(turn, 10.0),
             loads=(),
             effects=(Gravity(), SPRING, Torsion.at(O4=(2.0, 1.9, 0.1))),
             drive_bar=bar,
@@ -158,7 +158,7 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
         slip = np.abs(omega[j - 1] - omega[i - 1])
         load = np.hypot(*braked[PIN_FORCE[pin]].T)
         size = {"viscous": slip, "friction": 1.0, "pin_friction": load}[key]
-        loss = loss + math.prod(numbers) * slip * size
+        loss = loss + prod(numbers) * slip * size
     more = 10.0 * (braked["torque"] - answered(crank_rocker(effects=()))["torque"])
     assert (loss > 0.0).all()
     allowed = 1e-12 * 10.0 * np.abs(braked["torque"]).max()

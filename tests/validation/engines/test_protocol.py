@@ -4,9 +4,9 @@ What is stated comes back bit for bit, and what is wrong is said in a line.
 """
 
 import json
-import math
 from dataclasses import replace
 from functools import partial
+from math import pi
 
 import numpy as np
 from pytest import mark, raises
@@ -125,7 +125,7 @@ def test_nothing_travels_that_the_formulas_computed():
     assert data["bars"]["coupler"] == coupler
     placed = {"bar": 4, "force": [3.0, 0.7], "arm": [0.05, 1.0]}
     assert data["loads"][0] == placed | {"moment": 0.0, "frame": "world"}
-    assert data["effects"] == {"gravity": [9.81, -math.pi / 2], "viscous": {"O2": 0.01}}
+    assert data["effects"] == {"gravity": [9.81, -pi / 2], "viscous": {"O2": 0.01}}
     massless = fourbar.Scene(bare(0.3, 0.1, 0.25, 0.22), scene.motion)
     assert set(protocol.scene_to_json(massless)) == {"lengths", "drive"}
 
@@ -133,7 +133,7 @@ def test_nothing_travels_that_the_formulas_computed():
 def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
     ends = fourbar.Place(1, (0.1, -1.0)), fourbar.Place(4, (0.05, 0.2))
     gas = fourbar.Spring.gas(*ends, 0.4, 0.1, 100.0, 150.0)
-    table = fourbar.Table((0.0, math.pi, 2 * math.pi), (1.0, 0.5, 1.0))
+    table = fourbar.Table((0.0, pi, 2 * pi), (1.0, 0.5, 1.0))
     couple = fourbar.Load(4, moment=1.0, from_centre=(0.1, 0.0), table=table)
     scene = crank_rocker(effects=(fourbar.Springs((gas,)),), loads=(couple,))
     data = protocol.scene_to_json(scene)

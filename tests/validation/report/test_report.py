@@ -8,13 +8,13 @@ import base64
 import csv
 import gzip
 import io
-import math
 import re
 from dataclasses import replace
 from functools import cache
 from html import unescape
 from importlib import import_module
 from itertools import accumulate
+from math import isnan, nan, radians
 
 import numpy as np
 from pytest import approx, fixture, mark
@@ -185,7 +185,7 @@ def test_the_times_of_engines_are_those_of_the_run():
     refused = replace(bare.rows[0], engine="free-body", verdict=REFUSES)
     silent = summary_of([replace(bare, rows=[*bare.rows, refused])])
     (line,) = [line for line in silent.engines if line.engine == "free-body"]
-    assert math.isnan(line.microseconds)
+    assert isnan(line.microseconds)
 
 
 @mark.slow
@@ -265,7 +265,7 @@ def test_a_run_prints_one_row_an_engine_and_the_rest_on_demand(
     """
     monkeypatch.setenv("COLUMNS", "100")
     simulated = ("first", "mujoco-simulated", "RK4", "F12")
-    row = Row(*simulated, error, allowed, AGREES, "", math.radians(40.0), 1.0)
+    row = Row(*simulated, error, allowed, AGREES, "", radians(40.0), 1.0)
     share = replace(row, quantity="undecided", error=0.4, allowed=0.5)
     identity = replace(row, engine="formulas", quantity="torque", error=0.0)
     torque = replace(row, quantity="torque", error=1e-12, allowed=1e-6)
@@ -312,7 +312,7 @@ def fail(row, error=1e-3):
 
 
 OF_MINE = Row(
-    "a", "mine", "exact", "torque", 1e-15, 1e-14, AGREES, "", math.radians(120.0), 1.0
+    "a", "mine", "exact", "torque", 1e-15, 1e-14, AGREES, "", radians(120.0), 1.0
 )
 
 
@@ -392,9 +392,9 @@ CAUSES = [
         [fail(mine(quantity=name), 3e-8) for name in ("torque", "F32")],
         "torque and pin forces differ, motion agrees: the first 7 digits agree",
     ),
-    ([fail(OF_MINE, math.nan)], "no number for torque"),
+    ([fail(OF_MINE, nan)], "no number for torque"),
     (
-        [fail(OF_MINE, math.nan), replace(OPEN, error=math.nan)],
+        [fail(OF_MINE, nan), replace(OPEN, error=nan)],
         "no number at any position",
     ),
     ([fail(OF_MINE, 1e6), DEAD], "no answer: exit status 3 after 4 s"),
@@ -566,7 +566,7 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
 
 
 @mark.parametrize("columns", ["80", "40"])
-@mark.parametrize("theta_2, at", [(0.5, "28.6"), (math.nan, "-")])
+@mark.parametrize("theta_2, at", [(0.5, "28.6"), (nan, "-")])
 def test_a_value_far_beyond_what_is_allowed_leaves_the_numbers_of_the_table_whole(
     columns, theta_2, at, monkeypatch, printed
 ):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-import fourbar
+from fourbar import load, solve
 from fourbar.quantities import OK
 from fourbar.scene import command
 from fourbar_validation.compare.answer import Answer
@@ -13,8 +13,8 @@ from fourbar_validation.report.scene_pictures import draw_scene_figure
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.scenes.suites import MODELS
 
-PLAIN = fourbar.load(MODELS / "crank_rocker.toml")
-WHOLE = fourbar.solve(PLAIN, "force")
+PLAIN = load(MODELS / "crank_rocker.toml")
+WHOLE = solve(PLAIN, "force")
 
 
 def list_marks(scene, solution, torque, *at):
@@ -44,8 +44,8 @@ def test_no_mark_stands_where_nothing_is_judged():
 
     An engine's number there is not judged; beside the curve it would look wrong.
     """
-    scene = fourbar.load(MODELS / "capabilities" / "kite.toml")
-    solution = fourbar.solve(scene, "force")
+    scene = load(MODELS / "capabilities" / "kite.toml")
+    solution = solve(scene, "force")
     judged = solution.status_code == OK
     assert np.flatnonzero(~judged).tolist() == [0, 18, 36]
     torque = np.where(judged, solution.torque, -1e3)

@@ -5,15 +5,14 @@ the mistake is made in a calculation which knows nothing of the hypotheses.
 """
 
 import cmath
-import math
 from dataclasses import replace
 from functools import partial
 from itertools import cycle
+from math import pi, sin
 
 import numpy as np
 from pytest import mark
 
-import fourbar
 from fourbar import (
     Bar,
     Flywheel,
@@ -25,8 +24,11 @@ from fourbar import (
     Spring,
     Springs,
     Sweep,
+    Table,
     Torsion,
     Viscous,
+    load,
+    solve,
 )
 from fourbar.quantities import OK
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -237,7 +239,7 @@ def test_the_joint_of_a_driven_bar_carries_the_bars_behind_it(cut, bar, joint, b
     torque.
     """
     scene = replace(recommand(SCENE, speed=0.0, acceleration=0.0), drive_bar=bar)
-    right = fourbar.solve(scene, "force")
+    right = solve(scene, "force")
     torque = sum(
         scene.linkage.bar(one).mass * 9.81 * (right[f"G{one}"] - right[joint])[:, 0]
         for one in behind
@@ -316,7 +318,7 @@ def reverse_y(numbers, at):
 
 HARD_TO_EXPLAIN = {
     **{
-        name: fourbar.load(CAPABILITIES / f"{name}.toml")
+        name: load(CAPABILITIES / f"{name}.toml")
         for name in (
             "kite",
             "parallelogram",
@@ -381,9 +383,9 @@ def test_a_sign_is_named_under_every_command_and_at_change_points(name):
 
 def test_the_commanded_angle_is_looked_at_too():
     def measure_from_B(numbers, at):
-        numbers["theta_4"] = numbers["theta_4"] + math.pi
+        numbers["theta_4"] = numbers["theta_4"] + pi
 
-    scene = fourbar.load(CAPABILITIES / "command_output.toml")
+    scene = load(CAPABILITIES / "command_output.toml")
     (cause,) = find_causes_of(measure_from_B, scene)
     assert cause.startswith("measured from the other end of the bar")
 
@@ -404,7 +406,7 @@ def test_a_mistake_of_the_inertia_alone_is_said_to_be_there():
 @mark.parametrize("name", ["stroke_output", "cylinder_2_3", "push_output"])
 def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     """The weight of the coupler is what the balances with and without it differ by."""
-    scene = fourbar.load(CAPABILITIES / f"{name}.toml")
+    scene = load(CAPABILITIES / f"{name}.toml")
     scene = replace(scene, effects=(Gravity(),))
     massless = replace(scene.linkage.coupler, mass=0.0, density=None, inertia=0.0)
     light = relink(scene, coupler=massless)
@@ -512,7 +514,7 @@ def with_forces(angle, moment, **table):
 
 
 PLACE = (0.05, 1.0)
-TABLE = {"table": fourbar.Table((0.0, 2.0, 2.0 * math.pi), (1.0, 3.0, 1.0))}
+TABLE = {"table": Table((0.0, 2.0, 2.0 * pi), (1.0, 3.0, 1.0))}
 DRAWN = replace(SPRING, preload=-4.0)
 PULLING, PUSHING = (replace(SLACK, acts=acts) for acts in ("pull", "push"))
 RUBBED = replace(
@@ -523,7 +525,7 @@ RUBBED = replace(
 BARS = {name: getattr(SCENE.linkage, name) for name in ("input", "coupler", "output")}
 LIGHT = {name: Bar(bar.length) for name, bar in BARS.items()}
 WEIGHTS = tuple(
-    Load(number, (9.81 * bar.mass, -0.5 * math.pi), from_pin=bar.mass_centre)
+    Load(number, (9.81 * bar.mass, -0.5 * pi), from_pin=bar.mass_centre)
     for number, bar in enumerate(BARS.values(), 2)
 )
 ARM, FROM_PIN = with_load(arm=PLACE), with_load(from_pin=PLACE)
@@ -573,7 +575,7 @@ OTHER_SCENES = {
     ),
     "gravity is turned with the ground": (
         with_effects(Gravity()),
-        with_effects(Gravity(angle=SCENE.linkage.ground_angle - 0.5 * math.pi)),
+        with_effects(Gravity(angle=SCENE.linkage.ground_angle - 0.5 * pi)),
     ),
     "loads.*.force.1 reversed": (
         with_forces(0.7, 0.0),
@@ -595,7 +597,7 @@ OTHER_SCENES = {
     # an arm from the first pin, in world axes, gives one moment everywhere
     "loads.0 (bar 4): its arm is measured from the bar's first pin, not from G": (
         ARM,
-        with_load(moment=3.0 * 0.05 * math.sin(0.7 - 1.0), **AT_PIN),
+        with_load(moment=3.0 * 0.05 * sin(0.7 - 1.0), **AT_PIN),
     ),
     "loads.0 (bar 4): its place is measured from G, not from the bar's first pin": (
         FROM_PIN,
@@ -704,7 +706,7 @@ def test_what_nobody_knows_is_no_known_mistake():
 
 
 def test_where_pins_slide_the_rows_about_the_first_wrong_one_are_looked_at():
-    scene = fourbar.load(CAPABILITIES / "sliding_pins.toml")
+    scene = load(CAPABILITIES / "sliding_pins.toml")
     scene = replace(scene, motion=Motion(Sweep(0.1, 6.0, 60), -10.0, 5.0))
 
     def spoil_one_more(numbers, at):

@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 from pytest import mark
 
-import fourbar
-from fourbar import Bar, FourBar, Friction, Motion, uniform
+from fourbar import Bar, FourBar, Friction, Motion, limit_positions, solve, uniform
 from fourbar.quantities import FORCE_NAMES, SINGULAR
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -46,7 +45,7 @@ class Echo:
         self.spoil = spoil
 
     def answer(self, scene, command):
-        s = fourbar.solve(scene, at=with_signs(scene.linkage, command))
+        s = solve(scene, at=with_signs(scene.linkage, command))
         numbers = {name: np.array(s[name]) for name in COMPARED_QUANTITIES}
         answer = Answer("echo", "exact", command, np.array(s.assembled), numbers)
         return self.spoil(answer) or answer
@@ -169,14 +168,14 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
 
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)
-LIMIT = fourbar.limit_positions(ROCKER)[0].theta_2
+LIMIT = limit_positions(ROCKER)[0].theta_2
 
 
 NEAR_ITS_LIMIT = next(
     scene
     for away in (1e-13, -1e-13)
     for scene in [Scene(ROCKER, Motion(LIMIT + away, 1.0))]
-    if fourbar.solve(scene).assembled.all()
+    if solve(scene).assembled.all()
 )
 """The condition of its accelerations is about 1e-13."""
 

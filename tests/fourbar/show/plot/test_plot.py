@@ -29,11 +29,13 @@ from fourbar import (
     Motion,
     Place,
     Point,
+    Scene,
     Sweep,
     Torsion,
     Viscous,
     load,
     solve,
+    uniform,
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals, limit_positions
@@ -369,8 +371,8 @@ def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
 @mark.parametrize("angle, position", [(radians(60.0), None), (None, radians(60.0))])
 def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
     """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
-    linkage = fourbar.uniform(*PARALLELOGRAM)
-    scene = fourbar.Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
+    linkage = uniform(*PARALLELOGRAM)
+    scene = Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
     figure = composed(scene, "bars", position=position)
     words = " ".join(figure.subfigs[0].get_supxlabel().split())
     moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
@@ -380,9 +382,9 @@ def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, posit
 
 def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_moment():
     """That of bar 4 has no pin forces: m g c/8 at 0 deg."""
-    linkage = fourbar.uniform(*PARALLELOGRAM)
+    linkage = uniform(*PARALLELOGRAM)
     motion = Motion(Sweep(0.0, tau, 12), 1.0)
-    figure = composed(fourbar.Scene(linkage, motion, effects=(Gravity(),)), "bars")
+    figure = composed(Scene(linkage, motion, effects=(Gravity(),)), "bars")
     words = " ".join(figure.subfigs[0].get_supxlabel().split())
     moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
     assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
@@ -493,7 +495,7 @@ OTHERS = {
     "law": by_law(),
     "release": released(),
     "three rockers": thesis(),
-    "no torque": fourbar.Scene(fourbar.uniform(*PARALLELOGRAM), Motion([0.3], 1.0), 3),
+    "no torque": Scene(uniform(*PARALLELOGRAM), Motion([0.3], 1.0), 3),
 }
 REFUSED = read_rows(r"""
 crank-rocker | {} | must
