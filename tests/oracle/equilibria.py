@@ -35,13 +35,7 @@ from fourbar_validation.compare.tolerance import (
     K,
     divide,
 )
-from fourbar_validation.engines.balls import (
-    OF_PIECE,
-    STEP_BITS,
-    compute_outputs,
-    make_balls,
-)
-from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines import balls, free_body
 from fourbar_validation.engines.prediction import LARGEST_FIRST_ORDER
 from fourbar_validation.run.question import NotAskedError
 from tests.oracle.bounds import REST
@@ -174,7 +168,7 @@ def _hold(scene, angle, branch):
     """
     command = Command(angle, np.full(angle.shape, branch, dtype=np.int8), 0.0, 0.0)
     with np.errstate(all="ignore"):
-        answer = FreeBody().answer(scene, command)
+        answer = free_body.FreeBody().answer(scene, command)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
     sound = answer.assembled & (np.abs(sine) >= WELL_CONDITIONED)
     return np.where(sound, answer.quantities["torque"], np.nan)
@@ -261,14 +255,14 @@ def _derive_torque(scene, bar, angle, branch):
     """
     commanded_motion = {f"theta_{bar}": angle, f"omega_{bar}": 0.0}
     scene = replace(scene, motion=Motion(**commanded_motion), drive_bar=bar)
-    x = make_balls(scene, angle)
+    x = balls.make_balls(scene, angle)
     x |= {
         f"{name}_{k}": arb(1)
         for k, load in enumerate(scene.loads)
         if load.table
-        for name in OF_PIECE
+        for name in balls.OF_PIECE
     }
-    step = arb(2) ** -STEP_BITS
+    step = arb(2) ** -balls.STEP_BITS
     commanded = f"theta_{bar}"
 
     def derive(**changed):
@@ -282,7 +276,7 @@ def _derive_torque(scene, bar, angle, branch):
             for side in (1, -1)
         ]
         answers = [
-            compute_outputs(scene, branch, inputs)
+            balls.compute_outputs(scene, branch, inputs)
             for inputs in (base_inputs, *turned, base_inputs | {f"alpha_{bar}": arb(1)})
         ]
         if not all(answer and "torque" in answer for answer in answers):

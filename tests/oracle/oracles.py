@@ -5,25 +5,23 @@ An oracle takes a question of the harness and yields its rows. No run makes them
 
 from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.question import NotAskedError
-from tests.oracle.cuts import internal_forces
+from tests.oracle import cuts, files, sensitivities
 from tests.oracle.equilibria import equilibria
-from tests.oracle.files import sdf, usd
 from tests.oracle.points import points
-from tests.oracle.sensitivities import sensitivity, study, tolerances
 from tests.oracle.summary import summary
 
 ORACLES = {
     oracle.__name__: oracle
     for oracle in (
         points,
-        study,
-        sensitivity,
-        tolerances,
-        internal_forces,
+        sensitivities.study,
+        sensitivities.sensitivity,
+        sensitivities.tolerances,
+        cuts.internal_forces,
         summary,
         equilibria,
-        sdf,
-        usd,
+        files.sdf,
+        files.usd,
     )
 }
 

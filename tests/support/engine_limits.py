@@ -16,22 +16,8 @@ from fourbar.mjcf.document import compute_load_ratio
 from fourbar.scene import command
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.tolerance import SIMULATED
-from fourbar_validation.engines import pinocchio
-from fourbar_validation.engines.limits import (
-    FASTEST,
-    HEAVIEST,
-    LIGHTEST,
-    MOST_UNEVEN,
-    NEAREST_CENTRE,
-    NEAREST_TOGGLE,
-    PROXIMAL_BOUNDARY,
-    QUICKEST_START,
-    SLOWEST,
-    Boundary,
-)
-from fourbar_validation.engines.mujoco import simulate
-from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, merges_points
-from fourbar_validation.engines.mujoco.runner import RunCourse
+from fourbar_validation.engines import limits, pinocchio
+from fourbar_validation.engines.mujoco import closed_loop, runner, simulate
 from fourbar_validation.scenes.hard_families import (
     draw_lengths_of_type,
     dress,
@@ -46,7 +32,7 @@ from fourbar_validation.scenes.random import DrawnType
 class Measured(NamedTuple):
     """One limit, and what asks the engine itself at a value of the limited quantity."""
 
-    of: Boundary
+    of: limits.Boundary
     inside: float
     outside: float
     holds: object
@@ -54,7 +40,7 @@ class Measured(NamedTuple):
 
 def _simulated(scene):
     """The simulation itself, whatever its declared limits."""
-    course = RunCourse(scene, command(scene))
+    course = runner.RunCourse(scene, command(scene))
     return simulate._Simulation(RECIPE, course, bounded=False).answer()
 
 
@@ -104,7 +90,7 @@ def _loaded(ratio):
 def _starts(acceleration):
     """Tell whether the file brings the crank from rest to its speed in two steps."""
     settings = replace(RECIPE, timestep=_BASE.motion.speed / (2.0 * acceleration))
-    loop = ClosedLoop(write_mjcf(_BASE, settings))
+    loop = closed_loop.ClosedLoop(write_mjcf(_BASE, settings))
     mujoco.mj_step(loop.model, loop.data, 10)
     return not loop.bad()
 
@@ -131,8 +117,10 @@ def _centre_kept(r):
     m.
     """
     scene = replace_bars(_BASE, output=replace(_BASE.linkage.output, centre=(r, 0.5)))
-    loop = ClosedLoop(write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False))
-    return not merges_points(loop.model)
+    loop = closed_loop.ClosedLoop(
+        write_mjcf(scene, replace(RECIPE, timestep=1e-3), keyframe=False)
+    )
+    return not closed_loop.merges_points(loop.model)
 
 
 def _proximal(mu):
@@ -148,15 +136,18 @@ def _proximal(mu):
 
 
 MEASURED = (
-    Measured(NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
+    Measured(limits.NEAREST_TOGGLE, 0.06, 0.01, _near_toggle),
     Measured(
-        FASTEST, 3e4, 3e5, lambda omega_2: not _simulated(_at_speed(omega_2)).alarms
+        limits.FASTEST,
+        3e4,
+        3e5,
+        lambda omega_2: not _simulated(_at_speed(omega_2)).alarms,
     ),
-    Measured(SLOWEST, 1e-10, 1e-11, _crank_acceleration),
-    Measured(HEAVIEST, 1e10, 1e11, _loaded),
-    Measured(NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
-    Measured(LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
-    Measured(QUICKEST_START, 1e9, 1e11, _starts),
-    Measured(MOST_UNEVEN, 1e3, 1e5, _in_narrow_window),
-    Measured(PROXIMAL_BOUNDARY, 1e-8, 0.0, _proximal),
+    Measured(limits.SLOWEST, 1e-10, 1e-11, _crank_acceleration),
+    Measured(limits.HEAVIEST, 1e10, 1e11, _loaded),
+    Measured(limits.NEAREST_CENTRE, 2e-6, 5e-7, _centre_kept),
+    Measured(limits.LIGHTEST, 1.001e-15, 0.999e-15, _compiles),
+    Measured(limits.QUICKEST_START, 1e9, 1e11, _starts),
+    Measured(limits.MOST_UNEVEN, 1e3, 1e5, _in_narrow_window),
+    Measured(limits.PROXIMAL_BOUNDARY, 1e-8, 0.0, _proximal),
 )

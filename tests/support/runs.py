@@ -14,11 +14,9 @@ from fourbar_validation.compare.rows import (
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import Engine
-from fourbar_validation.regression import render
-from fourbar_validation.regression.changes import compare_runs
-from fourbar_validation.regression.record import describe_run, open_run, write_about
+from fourbar_validation.regression import changes, record, render
 
-HERE = describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
+HERE = record.describe_run([Engine("engine", FreeBody, EQUIVALENCE)], "suite")
 """What a run of one engine was made with."""
 ROW = Row(
     "scene", "engine", "exact", "torque", 1e-15, 1e-14, AGREES, "equivalence", 1.0, 1.0
@@ -51,13 +49,13 @@ def save_run(folder, rows, times="", about=HERE):
     write_results(rows, folder / "results.csv")
     if times:
         (folder / "timings.csv").write_text(HEAD + times)
-    write_about(about, folder)
+    record.write_about(about, folder)
     return folder
 
 
 def read_run(path):
     """What a run was made with, and all its rows."""
-    run = open_run(path)
+    run = record.open_run(path)
     return run.about, list(run.rows())
 
 
@@ -70,7 +68,7 @@ def compare_rows(old, new):
         ).astype(COLUMN_TYPES)
         for _, rows in (old, new)
     )
-    return compare_runs((old[0], before), (new[0], after))
+    return changes.compare_runs((old[0], before), (new[0], after))
 
 
 def compare_made_here(old, new):

@@ -11,11 +11,8 @@ import textwrap
 
 from pytest import fixture, mark, raises
 
-from fourbar import effects
-from fourbar.effects import Load
-from fourbar.errors import LimitError
+from fourbar import effects, errors, mjcf
 from fourbar.files import dump, loads
-from fourbar.mjcf import write_mjcf
 from fourbar_validation.compare import effect_sizes as in_scales
 from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body_effects
@@ -107,8 +104,8 @@ def test_engines_without_a_model_refuse_the_example(
 
 
 def test_mjcf_has_no_counterpart_of_the_example(latch):
-    with raises(LimitError, match="'latch'"):
-        write_mjcf(guide_scene())
+    with raises(errors.LimitError, match="'latch'"):
+        mjcf.write_mjcf(guide_scene())
 
 
 def test_without_its_size_nothing_is_judged_by_another_scale(latch, monkeypatch):
@@ -132,7 +129,7 @@ def test_every_effect_of_the_package_has_a_row_in_each_table():
     keys = {*effects.list_kinds()}
     assert keys == {*free_body_effects.WRENCH_OF}
     assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF}
-    for kind in (*effects.list_kinds().values(), Load):
+    for kind in (*effects.list_kinds().values(), effects.Load):
         assert kind.size is effects.Effect.size  # nothing judged sets its own scale
     without_mjcf = {
         key

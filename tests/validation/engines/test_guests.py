@@ -16,9 +16,7 @@ import fourbar
 from fourbar import Motion, Sweep
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
-from fourbar_validation.engines import guests, programs
-from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.registry import ENGINES, load_further
+from fourbar_validation.engines import asking, guests, programs, registry
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.question import FREE_BODY
@@ -543,7 +541,7 @@ SAME += ("predicted",)
     "engine",
     [
         param(engine, id=engine.name, marks=[mark.slow] * engine.through_time)
-        for engine in (*ENGINES, *load_further())
+        for engine in (*registry.ENGINES, *registry.load_further())
     ],
 )
 def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
@@ -560,7 +558,7 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
         command = fourbar.command(scene)
         if explain_refusal(inside, command):
             continue
-        ours, theirs = (ask_at(one, scene, command) for one in (inside, outside))
+        ours, theirs = (asking.ask_at(one, scene, command) for one in (inside, outside))
         for name in SAME:
             np.testing.assert_equal(getattr(theirs, name), getattr(ours, name), name)
         answered += 1

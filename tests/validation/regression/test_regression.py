@@ -23,10 +23,7 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import ResultsWriter
 from fourbar_validation.compare.rows import FAILS, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, ErrorBound
-from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.guests import STATED_BY_THE_ENGINE
-from fourbar_validation.engines.limits import BOUNDARIES
-from fourbar_validation.engines.registry import Engine
+from fourbar_validation.engines import free_body, guests, limits, registry
 from fourbar_validation.places import MODELS
 from fourbar_validation.regression import record, render, rules
 from fourbar_validation.regression.changes import Kind
@@ -397,7 +394,7 @@ def test_rows_that_changed_are_grouped_by_engine_and_cause_the_worst_first():
     assert groups[0].partition(": ")[2] in page
 
 
-EXACT = Engine("engine", FreeBody, EQUIVALENCE)
+EXACT = registry.Engine("engine", free_body.FreeBody, EQUIVALENCE)
 
 
 def made(rows, scenes):
@@ -494,7 +491,7 @@ def test_of_suites_too_long_to_be_stated_only_the_hash_says_that_scenes_changed(
 def hold(error, reason="fewer digits", **fields):
     """The engine with a tolerance that it states itself."""
     text = f"{error:g} of the scale: {reason}"
-    bound = ErrorBound(STATED_BY_THE_ENGINE, text, error, False)
+    bound = ErrorBound(guests.STATED_BY_THE_ENGINE, text, error, False)
     return replace(EXACT, tolerance=bound, **fields)
 
 
@@ -521,8 +518,8 @@ def test_each_entry_of_a_rule_can_weaken_it(old, new, what):
 
 def test_k_and_a_stated_limit_are_rules_whoever_changes_them(monkeypatch):
     monkeypatch.setattr(rules, "K", 500.0)
-    harsher = BOUNDARIES[0]._replace(boundary=0.5)
-    monkeypatch.setattr(rules, "BOUNDARIES", (harsher, *BOUNDARIES[1:]))
+    harsher = limits.BOUNDARIES[0]._replace(boundary=0.5)
+    monkeypatch.setattr(rules, "BOUNDARIES", (harsher, *limits.BOUNDARIES[1:]))
     found = compare_rows((HERE, [ROW]), made([ROW], {}))
     assert [str(weakening) for weakening in found.weakened] == [
         "K: factor 50.0 -> 500.0",

@@ -7,10 +7,7 @@ from dataclasses import replace
 from pytest import approx, mark
 
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
-from fourbar_validation.report.junit import list_cases, write_document
-from fourbar_validation.report.overview import OVERVIEW_GROUPS
-from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.report.scene_record import Record
+from fourbar_validation.report import junit, overview, run_summary, scene_record
 from tests.support.runs import ROW
 
 OUTCOMES = {
@@ -23,23 +20,23 @@ OUTCOMES = {
 
 
 def record(*rows):
-    return Record("scene", title="Scene", rows=list(rows))
+    return scene_record.Record("scene", title="Scene", rows=list(rows))
 
 
 @mark.parametrize("verdict", OUTCOMES)
 def test_a_verdict_is_its_outcome(verdict):
-    (case,) = list_cases([replace(ROW, verdict=verdict)])
+    (case,) = junit.list_cases([replace(ROW, verdict=verdict)])
     assert case.outcome == OUTCOMES[verdict]
 
 
 def test_each_suite_and_the_document_count_their_cases():
     verdicts = {"a": (AGREES, FAILS, REFUSES, FAILS), "b": (UNDECIDED, AGREES, AGREES)}
-    cases = list_cases(
+    cases = junit.list_cases(
         replace(ROW, scene=scene, quantity=f"F{i}", verdict=verdict)
         for scene, some in verdicts.items()
         for i, verdict in enumerate(some)
     )
-    document = ET.fromstring(write_document("run", cases))
+    document = ET.fromstring(junit.write_document("run", cases))
     counted = {
         suite.get("name"): tuple(
             int(suite.get(kind, "")) for kind in ("tests", "failures", "skipped")
@@ -60,10 +57,10 @@ def test_the_worst_row_of_a_group_is_that_which_uses_most_of_its_allowance():
         replace(ROW, quantity=name, error=share * 1e-14)
         for name, share in shares.items()
     ]
-    summary = Summary()
+    summary = run_summary.Summary()
     summary.add(record(*rows))
     (line,) = summary.independent
-    cells = [" ".join(line.cell(group)) for group in OVERVIEW_GROUPS]
+    cells = [" ".join(line.cell(group)) for group in overview.OVERVIEW_GROUPS]
     assert any(cell.startswith("9.0e-15") for cell in cells)
     assert (line.counts.compared, line.counts[FAILS]) == (4, 0)
 
@@ -82,7 +79,7 @@ def test_a_missing_answer_uses_all_that_is_allowed():
     ],
 )
 def test_a_run_is_good_where_something_holds_and_nothing_fails(rows, good):
-    summary = Summary()
+    summary = run_summary.Summary()
     summary.add(record(*rows))
     assert summary.good == good
     assert ("hold" in summary.headline and "not hold" not in summary.headline) == good
