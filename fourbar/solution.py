@@ -61,7 +61,7 @@ SHOWN_PARTS = (
 """Main quantities, and sizes of the pin forces, that a notebook shows of a study."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Solution(Quantities):
     """The answer of the formulas at n positions, in SI units and radians.
 
@@ -93,23 +93,23 @@ class Solution(Quantities):
     """
     branch: Signs
     """Sign of sin(theta_4 - theta_3): +1 or -1."""
-    points: dict[str, Array] = field(default_factory=dict, kw_only=True)
+    points: dict[str, Array] = field(default_factory=dict)
     """Positions of the scene's own points by name, (n, 2), m."""
-    velocity: dict[str, Array] = field(default_factory=dict, kw_only=True)
+    velocity: dict[str, Array] = field(default_factory=dict)
     """Velocities of the scene's points, m/s."""
-    acceleration: dict[str, Array] = field(default_factory=dict, kw_only=True)
+    acceleration: dict[str, Array] = field(default_factory=dict)
     """Accelerations of the scene's points, m/s^2."""
-    scene: Scene = field(default=None, kw_only=True)  # type: ignore[assignment]
+    scene: Scene = None  # type: ignore[assignment]
     """Scene that was solved; None for a study."""
-    change_points: tuple[float, ...] | None = field(default=None, kw_only=True)
+    change_points: tuple[float, ...] | None = None
     """Times at which a free motion passed a change point, s. Another motion was
     possible there.
     """
-    with_extremes: Command | None = field(default=None, kw_only=True)
+    with_extremes: Command | None = None
     """Instants of a free motion, and those between at which an angle of it is largest
     or smallest.
     """
-    command_at: Callable[[Array], Command] | None = field(default=None, kw_only=True)
+    command_at: Callable[[Array], Command] | None = None
     """Function that returns a free motion at other times, (n,) rising from 0, s,
     without integrating it again.
     """

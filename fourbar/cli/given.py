@@ -235,7 +235,7 @@ def read_positions(scene: Scene, text: str) -> Command:
     that the linkage can have; any other column, and each of a motion over time, has its
     value in the scene's motion.
     """
-    from fourbar.effects.linear_drive import LinearDrive
+    from fourbar.effects.force_drive import LinearDrive
     from fourbar.files.drawn_pins import list_drawn
     from fourbar.show.located import EXTREMES, locate
 

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from fourbar.effects.effect import Effect as Effect
     from fourbar.effects.flywheel import Flywheel as Flywheel
     from fourbar.effects.force_drive import ForceDrive as ForceDrive
+    from fourbar.effects.force_drive import LinearDrive as LinearDrive
+    from fourbar.effects.force_drive import PointDrive as PointDrive
     from fourbar.effects.friction import Friction as Friction
     from fourbar.effects.gravity import Gravity as Gravity
-    from fourbar.effects.linear_drive import LinearDrive as LinearDrive
     from fourbar.effects.load import Load as Load
     from fourbar.effects.load import Table as Table
     from fourbar.effects.pin_friction import PinFriction as PinFriction
     from fourbar.effects.place import Place as Place
-    from fourbar.effects.point_drive import PointDrive as PointDrive
     from fourbar.effects.spring import Spring as Spring
     from fourbar.effects.spring import Springs as Springs
     from fourbar.effects.torsion import Torsion as Torsion

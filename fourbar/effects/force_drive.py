@@ -1,4 +1,4 @@
-"""Base class of the drives that exert a force instead of a couple.
+"""Drives that exert a force instead of a couple: along a line, or at a point.
 
 Per newton of the drive the bars get unit vectors at its points. The power of that over
 the speed of the independent angle q is ds/dq, and virtual work gives the force,
@@ -13,18 +13,20 @@ for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from fourbar.effects.effect import Actions
-from fourbar.effects.place import COINCIDENT_POINTS, Place, Placed
+from fourbar.effects.load import FRAMES
+from fourbar.effects.place import COINCIDENT_POINTS, At, Line, Place, Placed
 from fourbar.errors import InputError, write_in_units
-from fourbar.formulas.arithmetic import Number, is_any
+from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.pin_forces import Body
-from fourbar.linkage import ENDS, MOVING_BARS, PINS, FourBar
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, Declared, FourBar, OneOf
 from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
@@ -140,3 +142,80 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
         if abs(point.in_bar - along) <= nothing:
             bars.update(PINS[pin])
     return bars
+
+
+@dataclass(frozen=True, slots=True)
+class LinearDrive(Line, ForceDrive):
+    """A force along the line between two points, as of a cylinder.
+
+    It is in N, positive where it pushes.
+
+    Parameters
+    ----------
+    start, end : points on two different bars, one of them the ground perhaps.
+    """
+
+    start: Annotated[Place, At("from")]
+    end: Annotated[Place, At("to")]
+    has_stroke = True
+
+    @property
+    def ends(self) -> tuple[tuple[float, Place], ...]:
+        """Return both ends, each with the sense in which the drive pushes it."""
+        return (-1.0, self.start), (1.0, self.end)
+
+    @property
+    def may_be_commanded(self) -> bool:
+        """Return True if the stroke turns bar 2 or 4, as between it and the ground."""
+        return {self.start.bar, self.end.bar} in ({1, 2}, {1, 4})
+
+    def line(self, state: State) -> tuple[Number, Number]:
+        """Compute the stroke, m, and the unit vector from `start` to `end`.
+
+        The vector is NaN where they coincide.
+        """
+        across = self.across(state)
+        stroke = np.abs(across)
+        return stroke, across / stroke
+
+    def act(self, actions: Actions, force: Number) -> None:
+        """Push the ends of the drive apart."""
+        _, direction = self.line(actions.state)
+        actions.pull(self.end, self.start, force * direction)
+
+
+@dataclass(frozen=True, slots=True)
+class PointDrive(ForceDrive):
+    """A force at a place of bar 2, 3 or 4 in a direction, N, positive along it.
+
+    A hand on a lid and the handle of pliers are examples. ds/dq is the component in the
+    direction of the point's derivative by the independent angle.
+
+    Parameters
+    ----------
+    place : where the force acts, which turns with its bar.
+    direction : angle of the force, rad.
+    frame : "world": the direction is from +x; "bar": from the bar's line, and turns
+        with it.
+    """
+
+    place: Annotated[Place, At(bars=MOVING_BARS, is_value=True)]
+    direction: Annotated[float, Declared("rad")]
+    frame: Annotated[str, OneOf(FRAMES)] = "world"
+
+    @property
+    def ends(self) -> tuple[tuple[float, Place], ...]:
+        """Return the place, along the direction."""
+        return ((1.0, self.place),)
+
+    def line(self, state: State) -> tuple[None, Number]:
+        """Return no stroke, and the unit vector of the direction in world axes."""
+        unit = polar(1.0, self.direction)
+        if self.frame == "bar":
+            return None, unit * state.direction(self.place.bar)
+        return None, unit + 0.0 * state.direction(self.place.bar)
+
+    def act(self, actions: Actions, force: Number) -> None:
+        """Push the point of the drive."""
+        _, direction = self.line(actions.state)
+        actions.force(self.place.bar, force * direction, self.place.in_bar)

@@ -2,7 +2,6 @@
 
 from fourbar.mjcf.document import (
     SIMULATORS,
-    WindowMotion,
     choose_run,
     list_defaults,
     make_scene,
@@ -19,7 +18,6 @@ __all__ = (
     "SIMULATORS",
     "Plane",
     "Settings",
-    "WindowMotion",
     "choose_run",
     "list_defaults",
     "make_scene",

@@ -405,11 +405,10 @@ class WindowMotion:
             2.0 * angle / (self.omega + math.copysign(math.sqrt(squared), self.omega))
         )
 
-    def timestep(self, settings: Settings = RECIPE, at_least: int = 0) -> float:
+    def timestep(self, settings: Settings = RECIPE) -> float:
         """Return a timestep that divides the turn, s.
 
-        The settings state the least number of steps per revolution and per window, and
-        `at_least` the least number in all.
+        The settings state the least number of steps per revolution and per window.
         """
         if settings.timestep is not None:
             return settings.timestep * settings.timestep_scale
@@ -419,7 +418,7 @@ class WindowMotion:
         width = abs(self.stop - self.start)
         steps = settings.count_steps(duration * self.fastest, width)
         # a window of 628 steps per revolution must not become one more by a rounding
-        steps = max(math.ceil(steps * (1.0 - 1e-9)), at_least, 1)
+        steps = max(math.ceil(steps * (1.0 - 1e-9)), 1)
         return duration / steps * settings.timestep_scale
 
 

@@ -529,7 +529,7 @@ def require_cylinder(drive: "ForceDrive | None") -> "LinearDrive":
 
     Raises InputError for any but a cylinder between the ground and bar 2 or 4.
     """
-    from fourbar.effects.linear_drive import LinearDrive
+    from fourbar.effects.force_drive import LinearDrive
 
     drives = "no cylinder"
     if isinstance(drive, LinearDrive):

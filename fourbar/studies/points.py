@@ -17,6 +17,7 @@ from fourbar.linkage import (
     A_BRANCH,
     MOST_INTERVALS,
     FourBar,
+    Whole,
     require,
     require_whole,
 )
@@ -115,10 +116,8 @@ def coupler_curve(
             branch = int(first.branch[0])
     every = circuits(linkage)
     point = complex(require("r_along", r_along), require("r_across", r_across))
-    numbers = range(len(every))
-    allowed = f"must be from 0 to {len(every) - 1}"
-    circuit = 0 if circuit is None else circuit
-    circuit = require_whole("circuit", circuit, numbers, allowed)
+    of_all = Whole(0, len(every) - 1)
+    circuit = of_all.check("circuit", 0 if circuit is None else circuit)
     branch = require_whole("branch", 1 if branch is None else branch, (1, -1), A_BRANCH)
     allowed = f"must be a multiple of 4 up to {MOST_INTERVALS}"
     steps = require_whole("steps", steps, range(4, MOST_INTERVALS + 1, 4), allowed)

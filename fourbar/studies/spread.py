@@ -11,7 +11,7 @@ import numpy as np
 
 from fourbar.errors import InputError, expect, needing
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import require_whole
+from fourbar.linkage import Whole, require_whole
 from fourbar.quantities import NOT_ASSEMBLED, Array, Indices, Mask
 from fourbar.scene import Scene, command
 from fourbar.solution import SHOWN_PARTS, find_values, is_scalar, split_parts
@@ -166,9 +166,7 @@ def tolerances(
     JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
-    may_be = range(2, _MOST_SAMPLES + 1)
-    allowed = f"must be a whole number from 2 to {_MOST_SAMPLES}"
-    samples = require_whole("samples", samples, may_be, allowed)
+    samples = Whole(2, _MOST_SAMPLES).check("samples", samples)
     is_generator = isinstance(seed, np.random.Generator)
     if not is_generator:
         allowed = "must be a whole number, 0 or more, or a numpy.random.Generator"

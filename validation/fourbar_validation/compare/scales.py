@@ -318,7 +318,8 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
         known["drive_condition"] = np.abs(
             np.sin(second) * np.cos(one) - np.cos(second) * np.sin(one)
         )
-    return Solution(at, scene, np.full(n, OK, dtype=np.uint8), at.branch, **known)
+    codes = np.full(n, OK, dtype=np.uint8)
+    return Solution(at=at, stated=scene, status_code=codes, branch=at.branch, **known)
 
 
 def _swing_points(

@@ -1,4 +1,4 @@
-"""The drive along a line.
+"""The drive along a line, and at a point.
 
 Against free bodies in balls, limiting cases, symmetry, power, and what is refused.
 """
@@ -19,6 +19,7 @@ from fourbar import (
     LinearDrive,
     Motion,
     Place,
+    Point,
     PointDrive,
     Scene,
     dump,
@@ -32,7 +33,7 @@ from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows, refused
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, PARALLELOGRAM, crank_rocker
-from tests.support.texts import LINE_DRIVEN
+from tests.support.texts import HELD, LINE_DRIVEN
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
 BARS = 10.0
@@ -157,3 +158,18 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
     width = rest.drive_force_high - rest.drive_force_low
     assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
+
+
+def test_a_study_and_a_file_carry_a_force_at_a_point():
+    scene = loads(HELD)
+    assert loads(dump(scene)) == scene
+    keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
+    varied = solve(vary(scene, keys))
+    handle = Point("handle", 2, (0.1, 0.0))
+    for k, direction in enumerate((math.pi / 2, 1.2)):
+        one = replace(
+            scene,
+            drive=replace(scene.drive, direction=direction),
+            points=(handle, scene.points[1]),
+        )
+        assert varied.drive_force[k] == solve(one).drive_force
