@@ -10,11 +10,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import DependencyError, InputError, write_count
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array
+from fourbar.quantities import COUPLE, LINE, PIN_FORCES, UNITS, Array, Indices
 from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.panels import split_runs
@@ -207,9 +206,7 @@ def _list_places(spreads: Tolerances) -> tuple[str, str, Array]:
     return "time", "s", spreads.time
 
 
-def _name_positions(
-    spreads: Tolerances, rows: NDArray[np.intp], units: Conversion
-) -> str:
+def _name_positions(spreads: Tolerances, rows: Indices, units: Conversion) -> str:
     """Count positions, and name the first intervals that they fill."""
     name, si, values = _list_places(spreads)
     unit, factor = find_unit_in(si, units)

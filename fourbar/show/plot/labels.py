@@ -6,8 +6,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fourbar.quantities import Mask
 from fourbar.show.plot.style import INK, fit_legends, split_complex
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def settle_labels(figure: "Figure") -> None:
         _place(label, inked, canvas.get_renderer())
 
 
-def _place(label: Any, inked: NDArray[np.bool_], renderer: Any) -> None:
+def _place(label: Any, inked: Mask, renderer: Any) -> None:
     """Place a label where it covers least, near and outward, and ink its box.
 
     `inked`: True for pixels that are drawn on, from below, (height, width).

@@ -14,10 +14,9 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError, clean_line, expect, needing
-from fourbar.quantities import Array
+from fourbar.quantities import Array, ComplexArray
 from fourbar.show.shown_units import choose_unit, write_short
 from fourbar.solution import Conversion
 from fourbar.writing import STANDARD_STREAM, write_bytes
@@ -93,7 +92,7 @@ GROUND_LINE: dict[str, Any] = {
     "zorder": 1,
 }
 """The line of the ground."""
-Points = NDArray[np.complex128]
+Points = ComplexArray
 """Points of a drawing as complex numbers x + iy."""
 _HEADED: dict[str, Any] = {
     "arrowstyle": "-|>",

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fourbar.quantities import OK, Array
+from fourbar.quantities import OK, Array, Mask
 from fourbar.scene import Command, Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.compare import mark_moving_drive
@@ -75,7 +74,7 @@ def compute_errors(
     return WorstErrors(**worst)
 
 
-def mark_far_from_poles(scene: Scene, command: Command) -> NDArray[np.bool_]:
+def mark_far_from_poles(scene: Scene, command: Command) -> Mask:
     """Mark where the drive is far from a pole, (n,).
 
     The driven bar, or the stroke, moves fast enough there.

@@ -7,11 +7,10 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Mask
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import compute_times
 from fourbar.solving import solve
@@ -232,7 +231,7 @@ def _follow_law(
     def measure(time: Array) -> Array:
         return np.asarray(wrap_difference(table.places - law.at(time)[0]))
 
-    def fits(time: Array) -> NDArray[np.bool_]:
+    def fits(time: Array) -> Mask:
         return np.abs(measure(time)) <= rounding
 
     def command_at(time: Array) -> Command:
@@ -283,7 +282,7 @@ def _follow_law(
 
 
 def _find_last_that_holds(
-    holds: Callable[[Array], NDArray[np.bool_]],
+    holds: Callable[[Array], Mask],
     inside: Array,
     outside: Array,
 ) -> Array:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Mask
 from fourbar.scene import Command, Scene
 
 
@@ -28,7 +27,7 @@ class Answer:
     """Setting of the engine: "exact", or for example "RK4 628/rev"."""
     at: Command | None = None
     """Motion of this answer: the command itself, or that of a simulation."""
-    assembled: NDArray[np.bool_] | None = None
+    assembled: Mask | None = None
     """Positions where the engine found by its own means that the loop closes, (n,)."""
     quantities: dict[str, Array] = field(default_factory=dict)
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not

@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import write_count
 from fourbar.quantities import (
@@ -28,6 +27,7 @@ from fourbar.quantities import (
     STAGE_OF,
     STATUS_NAMES,
     Array,
+    Codes,
 )
 from fourbar.scene import Scene
 from fourbar.solution import Solution
@@ -544,7 +544,7 @@ def judge_errors(
     )
 
 
-def _mark_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
+def _mark_stated(quantity: str, code: Codes, ours: Array) -> Mask:
     """Mark where the formulas have a single value of a quantity, (n,).
 
     After an overflow these are the quantities computed before it.
@@ -563,7 +563,7 @@ def _mark_stated(quantity: str, code: NDArray[np.uint8], ours: Array) -> Mask:
     return np.asarray(~unstated)
 
 
-def _count(codes: NDArray[np.uint8]) -> str:
+def _count(codes: Codes) -> str:
     """Count positions by status: "3 singular, 5 no_torque"."""
     counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
     return ", ".join(

@@ -7,10 +7,9 @@ bends there and does not jump: the power f |omega_j - omega_i| is continuous.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import MOVING_BARS, PINS
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Mask
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 
@@ -21,7 +20,7 @@ def mark_reversing(
     slip: float,
     *,
     in_time: bool = False,
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Mark where a dry pin of a moving linkage slips little, (n,).
 
     The slip is at most this part of the two speeds over sin^2 mu. There the sense of
@@ -42,7 +41,7 @@ def mark_reversing(
     return mask
 
 
-def _mark_resting(solution: Solution, pin: str, slip: float) -> NDArray[np.bool_]:
+def _mark_resting(solution: Solution, pin: str, slip: float) -> Mask:
     one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
     speeds = np.abs(one) + np.abs(second) + np.abs(_compute_speeds(solution)[2])
     return np.asarray(

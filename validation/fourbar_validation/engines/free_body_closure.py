@@ -10,10 +10,9 @@ is solved for theta_3, theta_4. Vectors of the plane are complex numbers, x + i 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
-from fourbar.quantities import Array, ComplexArray
+from fourbar.quantities import Array, ComplexArray, Mask, Signs
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.compare.pins import resolve
@@ -39,7 +38,7 @@ class Closed(NamedTuple):
     Angles and gap are NaN elsewhere.
     """
 
-    assembled: NDArray[np.bool_]
+    assembled: Mask
     theta: Array
     """Angles of the two bars that are not commanded, rad, (2, n)."""
     gap: Array
@@ -52,7 +51,7 @@ class Closed(NamedTuple):
 def close(
     linkage: FourBar,
     theta: Array,
-    branch: NDArray[np.int8],
+    branch: Signs,
     bar: int = 2,
 ) -> Closed:
     """Close the loop by Newton's method from the triangle of the lengths.
@@ -117,7 +116,7 @@ def _solve_newton(
     diagonal: ComplexArray,
     b: float,
     c: float,
-    branch: NDArray[np.int8],
+    branch: Signs,
     theta: Array,
 ) -> tuple[Array, Array]:
     """Return theta_3, theta_4 (2, n) and the gap left (n,), by Newton's steps.

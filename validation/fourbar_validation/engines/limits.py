@@ -8,10 +8,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.linkage import FourBar
 from fourbar.mjcf.document import compute_load_ratio, reduce_mass
+from fourbar.quantities import Array, Mask
 from fourbar.scene import Scene
 
 ROUNDING = 1e-8
@@ -140,8 +140,8 @@ def find_uneven(scene: Scene) -> str | None:
 
 def compute_least_sine(
     linkage: FourBar,
-    theta_2: NDArray[np.float64],
-    assembled: NDArray[np.bool_],
+    theta_2: Array,
+    assembled: Mask,
 ) -> float:
     """Compute the least |sin(theta_4 - theta_3)| between assembled neighbours.
 

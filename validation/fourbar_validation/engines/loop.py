@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.quantities import (
@@ -21,6 +20,8 @@ from fourbar.quantities import (
     STAGES,
     VECTORS,
     Array,
+    Mask,
+    Signs,
 )
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
@@ -279,7 +280,7 @@ def read_each(
     command: Command,
     names: Iterable[str],
     read: Read,
-) -> tuple[dict[str, Array], NDArray[np.bool_], float]:
+) -> tuple[dict[str, Array], Mask, float]:
     """Read each position that assembles, NaN elsewhere.
 
     Return that, where it assembles, and the greatest gap, m.
@@ -322,7 +323,7 @@ def make_blank(
 
 def split_answer(
     out: dict[str, Array],
-    branch: NDArray[np.int8],
+    branch: Signs,
 ) -> tuple[Command, dict[str, Array]]:
     """Split what was read into a command and the other quantities.
 

@@ -5,9 +5,8 @@ jams where the growth turns back. Vectors of the plane are complex numbers, x + 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fourbar.quantities import Array, ComplexArray
+from fourbar.quantities import Array, ComplexArray, Mask
 from fourbar_validation.engines.linear import solve_system
 
 _FRICTION_STAGES = 16
@@ -51,7 +50,7 @@ def solve_couples(
     C: ComplexArray,
     k: Array,
     x: Array,
-) -> tuple[Array, NDArray[np.bool_], Array]:
+) -> tuple[Array, Mask, Array]:
     """Solve by Newton's method from couples `x`.
 
     Return also where it converged, and the Jacobian, (n, p, p).

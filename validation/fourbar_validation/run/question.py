@@ -10,9 +10,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -211,18 +210,18 @@ class Question:
             yield make_breakdown(self.name, engine, error, setting)
 
 
-def spread_evenly(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+def spread_evenly(indices: Indices, count: int) -> Indices:
     """Choose some of many positions evenly, with both ends."""
     places = np.linspace(0, len(indices) - 1, count)
     return np.asarray(indices[np.unique(places.astype(int))])
 
 
-def select_positions(command: Command, indices: NDArray[np.intp]) -> Command:
+def select_positions(command: Command, indices: Indices) -> Command:
     """Take some positions of a command."""
     return command.part(indices).as_doubles()
 
 
-def take_member(study: Solution, index: int | NDArray[np.intp]) -> Solution:
+def take_member(study: Solution, index: int | Indices) -> Solution:
     """Take one linkage of a solved study, or some positions of one linkage."""
 
     def take(value: Any) -> Any:

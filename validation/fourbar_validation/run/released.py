@@ -13,11 +13,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Friction, Load
 from fourbar.linkage import PINS
-from fourbar.quantities import UNKNOWNS
+from fourbar.quantities import UNKNOWNS, Indices
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import ReleasedAnswer
 from fourbar_validation.compare.compare import Comparison
@@ -194,7 +193,7 @@ def _prescribe(question: Question) -> Iterator[Question]:
     told = (solution.theta_2, solution.branch, solution.omega_2, solution.alpha_2)
     command = with_signs(scene.linkage, Command(*told))
 
-    def ask(scene: Scene, indices: NDArray[np.intp]) -> Question:
+    def ask(scene: Scene, indices: Indices) -> Question:
         at = select_positions(command, indices)
         of_engines = (question.engines, question.output)
         driven = Question(question.name, scene, at, *of_engines)

@@ -22,14 +22,13 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Table
 from fourbar.errors import LimitError
 from fourbar.linkage import copy_with
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.model import unwind
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices, Mask
 from fourbar.scene import Command, Scene
 from fourbar.scene.motion import Motion
 from fourbar_validation.engines.description import (
@@ -129,7 +128,7 @@ class RunCourse:
         self.scene = replace(scene, motion=motion)
         """The scene whose MJCF is run through."""
 
-    def order(self) -> NDArray[np.intp]:
+    def order(self) -> Indices:
         """Order the positions as they are passed, as indices."""
         values = self.values if self.speed > 0.0 else -self.values
         return np.argsort(values, kind="stable")
@@ -179,7 +178,7 @@ class RunCourse:
         _, _, alpha = self.law.at(np.minimum(stages, self.law.time[-1]))
         return lambda _, data: float(alpha[round(data.time / half)])
 
-    def least_sine(self, closes: NDArray[np.bool_]) -> float:
+    def least_sine(self, closes: Mask) -> float:
         """Return the least |sin(theta_4 - theta_3)| on the way."""
         return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
 
@@ -442,7 +441,7 @@ class Lead(RunCourse):
         accelerations = solve_closed(loop.jacobian(), due, column, drift.tolist())
         return float(accelerations[O2])
 
-    def least_sine(self, closes: NDArray[np.bool_]) -> float:
+    def least_sine(self, closes: Mask) -> float:
         """Return the least |sin(theta_4 - theta_3)| on the way; 0 if signs differ."""
         command = self.of_input
         if np.ptp(command.branch):

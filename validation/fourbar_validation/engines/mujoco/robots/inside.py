@@ -30,11 +30,10 @@ from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Signs
 from fourbar.scene import find_signs
 from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
@@ -199,7 +198,7 @@ class LoopInside:
         first, second = (loop.angles[one - 1] for one in FOLLOWING[bar])
         self.signs = np.array([1 if math.sin(second - first) > 0.0 else -1], np.int8)
         """Sign of the sine of the angle between the bars that follow in the pose."""
-        self.assembly: NDArray[np.int8] | int = branch
+        self.assembly: Signs | int = branch
         if not is_in_line(loop.angles, bar):
             at_pose = np.array([loop.angles[bar - 1]])
             self.assembly = find_signs(self.linkage, at_pose, self.signs, bar)
@@ -302,7 +301,7 @@ class LoopInside:
         qpos = self._follow(self.turn_bars(angles))
         return qpos if self.close_gap(qpos) else None
 
-    def turn_bars(self, angles: Array, signs: NDArray[np.int8] | None = None) -> Array:
+    def turn_bars(self, angles: Array, signs: Signs | None = None) -> Array:
         """Return theta_1 to theta_4 at angles of the commanded bar, (n, 4), rad.
 
         The others go on from the last pose; where the loop is open they are NaN.
