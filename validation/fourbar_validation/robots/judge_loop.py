@@ -63,6 +63,10 @@ _MENDED = "fourbar_validation.engines.mujoco.robots.measure:examine_mended"
 _SOFTNESS = "fourbar_validation.engines.mujoco.robots.measure:predict_softness"
 _NOTHING = 1e-9
 """Cost below which a difference is one of the digits of a scene, which has twelve."""
+_MOST_ALLOWED = 0.1
+"""Part of the largest value of a quantity beyond which a file is wrong, whatever
+MuJoCo's stiffest constraint leaves in it.
+"""
 _BY_STIFFEST = (
     "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
 )
@@ -98,7 +102,8 @@ class LoopJudgement:
             left = write_error(softest.allowed / TIMES_PREDICTED)
             yield (
                 "The file is right as far as MuJoCo's constraints let it be: the "
-                f"stiffest (solimp 0.9999) leaves {left} of {softest.quantity} in it."
+                f"stiffest (solimp 0.9999) leaves at least {left} of"
+                f" {softest.quantity} in it."
             )
         if self.is_of_another_linkage:
             yield _LENGTHS_FIRST
@@ -246,21 +251,25 @@ def judge_answers(
 ) -> list[Row]:
     """Hold answers on a measured loop to a tolerance; see `list_rows`."""
     scene = measured.scene
-
-    def predicted(quantity: str, mask: Mask) -> Array:
-        left = (softness or {}).get(_name_force(scene, quantity), 0.0)
-        return np.full(len(mask), left)
-
     at = command(scene)
     judged = [name for name in JUDGED_QUANTITIES if name not in COMMAND_NAMES[at.bar]]
     if at.bar != 2:
         judged += ["theta_2", "omega_2"]
-    held = Demands(tolerance, judged)
-    if softness:
-        held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
     rows = []
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
+
+        def predicted(
+            quantity: str, mask: Mask, formulas: Solution = formulas
+        ) -> Array:
+            left = (softness or {}).get(_name_force(scene, quantity), 0.0)
+            largest = measure_sizes(getattr(formulas, quantity))[mask].max()
+            most = _MOST_ALLOWED * largest / TIMES_PREDICTED
+            return np.full(len(mask), min(left, most))
+
+        held = Demands(tolerance, judged)
+        if softness:
+            held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
         for row in Comparison(name, scene, answer, formulas, held).rows():
             force = _name_force(scene, row.quantity)
             scale = measured.find_vanishing(force)
@@ -268,7 +277,7 @@ def judge_answers(
                 rows.append(row)
                 continue
             left = TIMES_PREDICTED * (softness or {}).get(force, 0.0) / scale
-            allowed = max(tolerance.factor, left)
+            allowed = max(tolerance.factor, min(left, _MOST_ALLOWED))
             rows.append(_judge_vanishing(row, answer, formulas, scale, allowed))
     return rows
 
