@@ -14,6 +14,8 @@ import json
 import sys
 import time
 import tomllib
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -104,7 +106,7 @@ class _Text(importlib.machinery.SourceFileLoader):
         return code
 
 
-def _list_failing(names: list[str]) -> dict[str, list[str]]:
+def _list_failing(names: Iterable[str]) -> dict[str, list[str]]:
     """Check test scenes, and list the rows that fail by their names.
 
     A row is "engine quantity: reason".
@@ -114,11 +116,12 @@ def _list_failing(names: list[str]) -> dict[str, list[str]]:
     from fourbar_validation.run.judge import judge
 
     failing = {}
-    for name in names or FAULT_SCENES:
-        simulated = name.startswith("simulated")
-        offered = HARD_ENGINES if name.startswith("to full accuracy") else ENGINES
+    for name in names:
+        how, _, scene = name.rpartition(", ")
+        offered = HARD_ENGINES if how == "to full accuracy" else ENGINES
+        simulated = how == "simulated"
         engines = [engine for engine in offered if simulated or not engine.through_time]
-        rows = judge(name, FAULT_SCENES[name], engines).rows
+        rows = judge(name, FAULT_SCENES[scene], engines).rows
         failing[name] = [
             f"{row.engine} {row.quantity}: {row.reason}" for row in rows if row.failed
         ]
@@ -145,7 +148,8 @@ def inject_and_judge() -> None:
     """Inject the fault of each number, check its test scenes, print what fails."""
     numbers = [int(number) for number in sys.argv[1:]]
     if not numbers:
-        print(json.dumps(_list_failing([])))
+        listed = [entry.get("scenes", ()) for entry in read_faults()]
+        print(json.dumps(_list_failing(sorted({*chain.from_iterable(listed)}))))
     if len(numbers) == 1 and "tests" in (entry := read_faults()[numbers[0]]):
         print(json.dumps(_run_tests(entry)))
         return

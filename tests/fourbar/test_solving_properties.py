@@ -168,7 +168,7 @@ SCENES = dict(make_scenes()) | {
     and scene.motion.free is None
     and not find_refusal(scene)
 }
-STROKE = FAULT_SCENES["stroke"]
+STROKE = FAULT_SCENES["stroke_input"]
 SCENES["a stroke from the bar"] = replace(
     STROKE, drive=LinearDrive(STROKE.drive.end, STROKE.drive.start)
 )

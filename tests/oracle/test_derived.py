@@ -169,7 +169,15 @@ def test_right_answers_hold_where_they_are_hard_to_judge(name):
 
 
 @mark.parametrize(
-    "name", ["crank-rocker", "damped", "sprung", "flywheel", "sliding pins", "table"]
+    "name",
+    [
+        "crank-rocker",
+        "damped",
+        "springs",
+        "flywheel_alone",
+        "sliding_pins",
+        "load_table",
+    ],
 )
 def test_every_number_that_a_scene_states_is_found_in_its_file(name):
     scene = FAULT_SCENES[name]

@@ -27,13 +27,13 @@ SEED = 68
 LAWS, LAW_SHARE = 60, min(SHARE, 7)
 SAMPLE = {
     "slender": ORACLES,
-    "table": ("study",),
+    "load_table": ("study",),
     "limited": ("study", "sensitivity", "equilibria"),
     "loaded": ("internal_forces", "summary"),
     "part of a turn": ("summary",),
-    "simulated, damped": ("sdf",),
-    "simulated, tolerances": ("tolerances", "sdf"),
-    "simulated, drawn": ("study", "sensitivity"),
+    "damped": ("sdf",),
+    "tolerances": ("tolerances", "sdf"),
+    "drawn": ("study", "sensitivity"),
     "crank-rocker": ("points", "summary"),
     "load with corners": ("summary",),
     "fall in 5 ms": ("summary",),

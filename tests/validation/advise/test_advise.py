@@ -145,7 +145,7 @@ def test_out_of_reach_is_reported_with_what_would_reach_it(tmp_path, monkeypatch
     for scene, error, words in (
         (turning(positions=12), "1e-14", ("No setting of plain MJCF", "inverse dyn")),
         (still, "1e-3", ("nothing to run through",)),
-        (FAULT_SCENES["law"], "1e-3", ("motion law",)),
+        (FAULT_SCENES["law_periodic"], "1e-3", ("motion law",)),
     ):
         status, printed, _ = call({"scene": scene}, error, "-o", str(out))
         assert status == 1 and not out.exists()

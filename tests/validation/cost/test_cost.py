@@ -271,7 +271,7 @@ def test_a_scene_that_cannot_be_run_through_is_refused_before_anything_is_measur
     tmp_path,
 ):
     scene, out = tmp_path / "law.toml", tmp_path / "out"
-    scene.write_text(dump(FAULT_SCENES["law"]))
+    scene.write_text(dump(FAULT_SCENES["law_periodic"]))
     error = measure(scene, out).exception
     assert isinstance(error, fourbar.errors.LimitError) and "motion law" in str(error)
     assert not out.exists()

@@ -282,7 +282,7 @@ def test_an_engine_that_is_commanded_by_a_stroke_is_given_no_angle(monkeypatch):
         return answering(self, scene, command)
 
     monkeypatch.setattr(FreeBody, "answer", note)
-    rows = judge("", FAULT_SCENES["stroke"], [FREE_BODY]).rows
+    rows = judge("", FAULT_SCENES["stroke_input"], [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
     assert sum(row.engine == "free-body" and row.compared for row in rows) > 20
     assert asked
