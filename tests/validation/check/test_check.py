@@ -218,11 +218,6 @@ def gravity(*field):
     return solved(lambda scene: replace(scene, effects=effects))
 
 
-def rubbed(effect):
-    """Solve with one more effect."""
-    return solved(lambda scene: replace(scene, effects=(*scene.effects, effect)))
-
-
 def loads_times(factor, of_moments):
     """Multiply the forces of all loads, and their moments by another factor."""
 
@@ -433,15 +428,6 @@ IN_CRANK_ROCKER = {
     "bars.output.inertia 0.83 times ours": bars(scaled(inertia=0.83), "output"),
     "bars.coupler 1.2 times ours": bars(scaled(mass=1.2, inertia=1.2), "coupler"),
     "bars.coupler.mass 1.2 times ours": bars(scaled(mass=1.2), "coupler"),
-    "bars.coupler.centre at 0.05 m and 36.8699 deg (fitted)": bars(
-        centred(lambda d, x, y: (0.04, 0.03)), "coupler"
-    ),
-    "effects.viscous.A 0.05 N m s/rad, which the scene leaves out": rubbed(
-        fourbar.Viscous.at(A=0.05)
-    ),
-    "effects.friction.O4 0.07 N m, which the scene leaves out": rubbed(
-        Friction.at(O4=0.07)
-    ),
     "bars.coupler left out": bars(scaled(mass=0.0, inertia=0.0), "coupler"),
     "bars left out": bars(scaled(mass=0.0, inertia=0.0)),
     "m a and I alpha in kg cm/s^2": inertial(100.0, 100.0),

@@ -6,16 +6,15 @@ The number is a ratio, a factor or an offset.
 import cmath
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from functools import partial
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects import Friction, PinFriction, Viscous
+from fourbar.effects import Friction, PinFriction
 from fourbar.formulas.mobility import TURN
-from fourbar.linkage import BAR_NAMES, PINS, copy_with
+from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import UNITS, VECTORS, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Command, Scene
@@ -30,7 +29,7 @@ from fourbar_validation.check.variants import (
     state_all,
 )
 from fourbar_validation.check.wrong_scenes import group_numbers
-from fourbar_validation.compare.tolerance import wrap_difference
+from fourbar_validation.compare.tolerance import divide, wrap_difference
 from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
 
@@ -207,19 +206,19 @@ def _compute_residual(
 
 
 class _Family(NamedTuple):
-    """Problems that differ by numbers, of which those that fit best are looked for."""
+    """Problems that differ by a number, which is fitted."""
 
-    start: tuple[float, ...]
-    make: Callable[..., Mistake]
-    """Function of the numbers that returns the mistake of a problem."""
+    start: float
+    make: Callable[[float], Mistake]
+    """Function of the number that returns the mistake of a problem."""
     of_ours: bool = True
-    """True if the first are those of the right problem."""
+    """True if the first is that of the right problem."""
 
 
 def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """Fit numbers of the scene, the command's speed and its zero, whole ones first.
 
-    Each family is fitted by Gauss and Newton to the columns that differ.
+    Each is fitted by Gauss and Newton to the columns that differ.
     """
     columns = [column for column in differing if column.size.any()]
     if not columns:
@@ -230,9 +229,9 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     jumps = any(isinstance(one, Friction | PinFriction) for one in scene.effects)
     for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
         fitted = _fit(columns, family, right, jumps)
-        for numbers in () if fitted is None else (np.round(fitted), fitted):
-            if np.abs(numbers).max() > LEAST_NUMBER:
-                mistake = family.make(*numbers.tolist())
+        for number in () if fitted is None else (float(round(fitted)), fitted):
+            if abs(number) > LEAST_NUMBER:
+                mistake = family.make(number)
                 if mistake.text.endswith(FITTED) or not family.of_ours:
                     mistake = mistake._replace(times=CARRIED)
                 yield mistake
@@ -240,40 +239,38 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
 
 def _fit(
     columns: list[JudgedColumn], family: _Family, here: Array, jumps: bool
-) -> Array | None:
-    """Fit the numbers of a family; None if no others fit better than its first.
+) -> float | None:
+    """Fit the number of a family; None if no other fits better than its first.
 
-    `here`: residual at these, which is that of the right numbers if they are ours.
+    `here`: residual at this one, which is that of the right number if it is ours.
     `jumps`: whether friction may reverse, so that slopes are looked at on both sides.
     """
-    numbers = np.array(family.start)
+    number = family.start
 
-    def measure(numbers: Array) -> Array:
-        return _compute_residual(columns, family.make(*numbers.tolist())).ravel()
+    def measure(number: float) -> Array:
+        return _compute_residual(columns, family.make(number)).ravel()
 
     if not family.of_ours:
-        here = measure(numbers)
+        here = measure(number)
     for step in range(NEWTON):
-        slopes = []
-        for shift in FIT_STEP * np.eye(len(numbers)):
-            less = measure(numbers + shift)
-            more = 2.0 * here - less
-            if jumps or step > 0:
-                more = measure(numbers - shift)
-            # a number that jumps beside the position, as friction does, has no slope
-            smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
-            slopes.append(np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP))
-        known = np.isfinite(here) & np.isfinite(slopes).all(axis=0)
-        matrix = np.transpose(slopes)[known]
-        change = np.linalg.lstsq(matrix, here[known], rcond=None)[0]
+        less = measure(number + FIT_STEP)
+        more = 2.0 * here - less
+        if jumps or step > 0:
+            more = measure(number - FIT_STEP)
+        # a number that jumps beside the position, as friction does, has no slope
+        smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
+        slope = np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP)
+        known = np.isfinite(here) & np.isfinite(slope)
+        slopes = slope[known]
+        change = float(divide(slopes @ here[known], slopes @ slopes))
         size = _find_size(here)
-        if step == 0 and _find_size(here[known] - matrix @ change) > _IN_VAIN * size:
+        if step == 0 and _find_size(here[known] - slopes * change) > _IN_VAIN * size:
             return None
-        numbers = numbers - change
-        here = measure(numbers)
+        number -= change
+        here = measure(number)
         if not _find_size(here) < 0.5 * size:
-            return numbers if step > 0 else None
-    return numbers
+            return number if step > 0 else None
+    return number
 
 
 def _find_size(residual: Array) -> float:
@@ -281,7 +278,7 @@ def _find_size(residual: Array) -> float:
 
 
 def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
-    """List numbers of a scene that may be others, as functions of a factor or value."""
+    """List numbers of a scene that may be others, as functions of a factor."""
     fitted = {
         name: group
         for name, group in group_numbers(scene, places=True).items()
@@ -293,21 +290,7 @@ def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
     for name, length in lengths.items():
         fitted[f"lengths.{name}"] = {f"lengths.{name}": length}
     for name, group in fitted.items():
-        yield _Family((1.0,), partial(_scale, scene, at, name, group))
-    for name, bar in list_moving(scene):
-        r, phi = bar.mass_centre
-        start = r * math.cos(phi), r * math.sin(phi)
-        yield _Family(start, partial(_move_centre, scene, at, name))
-    for kind in (Viscous, Friction):
-        rows = {
-            row[0]: row[1]
-            for effect in scene.effects
-            if isinstance(effect, kind)
-            for row in effect.rows
-        }
-        for pin in PINS:
-            if pin not in rows:
-                yield _Family((0.0,), partial(_rub, scene, at, kind, rows, pin))
+        yield _Family(1.0, partial(_scale, scene, at, name, group))
 
 
 def _scale(
@@ -318,34 +301,13 @@ def _scale(
     return solve_other(text, replace_numbers(scene, numbers), at)
 
 
-def _move_centre(scene: Scene, at: Command, bar: str, x: float, y: float) -> Mistake:
-    r, phi = math.hypot(x, y), math.atan2(y, x)
-    numbers = {f"bars.{bar}.centre.0": r, f"bars.{bar}.centre.1": phi}
-    text = f"bars.{bar}.centre at {r:.6g} m and {math.degrees(phi):.4f} deg {FITTED}"
-    return solve_other(text, replace_numbers(scene, numbers), at)
-
-
-def _rub(
-    scene: Scene, at: Command, kind: Any, rows: dict[str, float], pin: str, k: float
-) -> Mistake:
-    """Return the problem with more damping or friction at a pin."""
-    others = [effect for effect in scene.effects if effect.key != kind.key]
-    rubbed = kind.at(**{pin: 0.0})
-    rubbed = copy_with(rubbed, **{rubbed.field: (*rows.items(), (pin, k))})
-    unit = kind.numbers[""].unit
-    text = (
-        f"effects.{kind.key}.{pin} {k:.6g} {unit}, which the scene leaves out {FITTED}"
-    )
-    return solve_other(text, replace(scene, effects=(*others, rubbed)), at)
-
-
 def _list_commands(
     scene: Scene, at: Command, columns: list[JudgedColumn]
 ) -> Iterator[_Family]:
     """List commands that may be others, as functions of a number."""
     for field, rate in zip(("speed", "acceleration"), at.names[1:], strict=True):
         if np.any(getattr(at, field)):
-            yield _Family((1.0,), partial(_hasten, scene, at, field, rate))
+            yield _Family(1.0, partial(_hasten, scene, at, field, rate))
     if at.moves_stroke:
         return
     n = len(at.angle)
@@ -359,7 +321,7 @@ def _list_commands(
     misfits = shares.reshape(len(tried), -1).mean(axis=1)
     if misfits.min() < PROMISING:
         start = float(tried[np.argmin(misfits)])
-        yield _Family((start,), partial(_turn, scene, at), of_ours=False)
+        yield _Family(start, partial(_turn, scene, at), of_ours=False)
 
 
 def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
