@@ -36,6 +36,7 @@ from fourbar_lab.contenders import (
 )
 from fourbar_lab.starts import measure_starts
 from fourbar_validation.advise.clocks import time_call
+from fourbar_validation.compare.bodies import pose
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.free_body import balance, speeds_and_accelerations
 from fourbar_validation.engines.free_body_closure import close
@@ -177,9 +178,8 @@ def _prepare_thirteen(n: int) -> Callable[[], object]:
     scene = make_example()
     at = command_positions(n)
     theta = close(scene.linkage, at.theta_2, at.branch).theta
-    motion = speeds_and_accelerations(
-        scene.linkage, at.theta_2, *list_speeds(at), *theta
-    )
+    posed = pose(scene.linkage, [at.theta_2, *theta])
+    motion = speeds_and_accelerations(posed, *list_speeds(at))
     return partial(balance, scene, motion)
 
 

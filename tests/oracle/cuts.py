@@ -13,6 +13,7 @@ import numpy as np
 import fourbar
 from fourbar.linkage import ENDS, MOVING_BARS, PIN_FORCE, PINS
 from fourbar.scene import command as command_of
+from fourbar_validation.compare.bodies import BodyMotion, make_vector, pose
 from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import (
     find_centre,
@@ -23,13 +24,11 @@ from fourbar_validation.compare.pins import (
 from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_effects import (
-    BodyMotion,
     BodyWrenches,
     apply_effect,
     apply_load,
     find_arm,
     list_sliding_pins,
-    make_vector,
 )
 from tests.oracle.bounds import CUT
 from tests.oracle.variants import ask_free_bodies, make_row, take_few
@@ -87,7 +86,7 @@ def move_bars(scene, command, answer):
         answer.quantities[f"{name}_{command.bar}"] for name in ("omega", "alpha")
     )
     return speeds_and_accelerations(
-        scene.linkage, theta[0], omega, alpha, theta[1], theta[2], command.bar
+        pose(scene.linkage, theta), omega, alpha, command.bar
     )
 
 
@@ -219,8 +218,7 @@ def _push_drive(scene, motion, answer, piece):
         if scene.drive_bar == piece.bar:
             piece.couple(piece.bar, answer.quantities["torque"])
         return
-    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
-    line = place_line(scene.linkage, scene.drive, theta)
+    line = place_line(motion, scene.drive)
     force = answer.quantities["drive_force"]
     for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
         piece.push(point.bar, sense * force * line.unit, arm)

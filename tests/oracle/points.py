@@ -4,6 +4,7 @@ import numpy as np
 
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK
+from fourbar_validation.compare.bodies import stack_components
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.compare.scales import TermSizes
 from fourbar_validation.compare.tolerance import (
@@ -13,7 +14,6 @@ from fourbar_validation.compare.tolerance import (
     count_half_turns,
     find_condition,
     find_error,
-    join_components,
     sum_lengths,
 )
 
@@ -46,7 +46,7 @@ def compare_points(question, scene, solution, reference, least=0.0):
     for name, (arms, feet) in move_points(scene, reference).items():
         for ours, kind, arm, at_foot in zip(tables, like, arms, feet, strict=True):
             if name in ours:
-                theirs = join_components((arm + at_foot).real, (arm + at_foot).imag)
+                theirs = stack_components(arm + at_foot)
                 terms = sum_lengths(link) if kind == "B" else sizes.sum_terms(kind)
                 size = np.abs(arm) + np.abs(at_foot) + terms
                 apart = find_error(kind, ours[name], theirs, size)

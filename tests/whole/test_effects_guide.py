@@ -171,7 +171,7 @@ def find_files(name):
 ADDED = {
     "fourbar/quantities/__init__.py": "    v_A: Array",
     "fourbar/evaluation/evaluate.py": '    "alpha_2": lambda',
-    "fourbar_validation/compare/scales.py": "        known |= _swing_points(",
+    "fourbar_validation/compare/scales.py": "        known |= motion.",
     "fourbar_validation/engines/balls.py": '    y |= {f"omega_{bar}"',
 }
 """Files in which the guide puts a line of its quantity, and the line beside it."""

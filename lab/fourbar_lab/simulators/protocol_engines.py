@@ -24,6 +24,7 @@ from fourbar.mjcf.document import Start, choose_run
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command, find_signs, with_signs
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.bodies import pose
 from fourbar_validation.engines.description import find_field, list_speeds
 from fourbar_validation.engines.free_body import speeds_and_accelerations
 from fourbar_validation.engines.free_body_closure import close
@@ -346,11 +347,7 @@ def start(scene: Scene) -> Start:
     first = usable[[np.argmin(theta_2) if omega_2 >= 0.0 else np.argmax(theta_2)]]
     theta = (commanded.theta_2[first], *closed.theta[:, first])
     omega = speeds_and_accelerations(
-        scene.linkage,
-        theta[0],
-        np.array([omega_2]),
-        np.zeros(1),
-        *theta[1:],
+        pose(scene.linkage, theta), np.array([omega_2]), np.zeros(1)
     ).omega
     q = [float(x[0]) for x in theta]
     v = [float(omega[bar][0]) for bar in (2, 3, 4)]

@@ -17,6 +17,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.variants import Mistake, drop_remainder, solve_other
+from fourbar_validation.compare.bodies import BodyMotion, pose, stack_components
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
 from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
 from fourbar_validation.engines.free_body import (
@@ -24,10 +25,9 @@ from fourbar_validation.engines.free_body import (
     FORCE_COLUMNS,
     solve_wrenches,
     speeds_and_accelerations,
-    stack_components,
 )
 from fourbar_validation.engines.free_body_closure import cross_products
-from fourbar_validation.engines.free_body_effects import BodyMotion, BodyWrenches
+from fourbar_validation.engines.free_body_effects import BodyWrenches
 
 _CUTS = {
     "B": ("F43", {2: ("O2", 1.0), 3: ("A", 1.0), 4: ("O4", -1.0)}),
@@ -162,10 +162,8 @@ def _find_wrong_accelerations(judge: Judge) -> Iterator[Mistake]:
     right = judge.right
     bar = right.at.bar
     rates = right[f"omega_{bar}"], right[f"alpha_{bar}"]
-    angles = right.theta_3, right.theta_4
-    motion = speeds_and_accelerations(
-        scene.linkage, right.theta_2, *rates, *angles, bar
-    )
+    posed = pose(scene.linkage, [right.theta_2, right.theta_3, right.theta_4])
+    motion = speeds_and_accelerations(posed, *rates, bar)
     wrong = [*_list_velocity_terms(judge, motion), *_list_parts_of_centres(motion)]
     inertia = {k: find_inertia(motion.linkage.bar(k)) for k in MOVING_BARS}
     for effect in scene.effects:
@@ -207,10 +205,7 @@ def _list_velocity_terms(judge: Judge, motion: BodyMotion) -> Iterator[_Accelera
     right = judge.right
     bar = right.at.bar
     zero = np.zeros(len(right))
-    angles = right.theta_3, right.theta_4
-    at_rest = speeds_and_accelerations(
-        motion.linkage, motion.theta_2, motion.alpha[bar], zero, *angles, bar
-    )
+    at_rest = speeds_and_accelerations(motion, motion.alpha[bar], zero, bar)
     for factor, done in _VELOCITY_TERM.items():
         alpha = {k: factor * (motion.alpha[k] - at_rest.omega[k]) for k in MOVING_BARS}
         alpha[bar] = zero

@@ -29,8 +29,8 @@ from fourbar_validation.check.variants import (
     state_all,
 )
 from fourbar_validation.check.wrong_scenes import group_numbers
+from fourbar_validation.compare.bodies import stack_components
 from fourbar_validation.compare.tolerance import divide, wrap_difference
-from fourbar_validation.engines.free_body import stack_components
 from fourbar_validation.scenes.bars import list_moving
 
 ENOUGH_NUMBERS = 3

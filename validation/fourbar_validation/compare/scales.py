@@ -17,13 +17,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.linkage import MOVING_BARS, Bar, FourBar
+from fourbar.linkage import MOVING_BARS, Bar
 from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
 from fourbar.scene import Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.bodies import pose, stack_components
 from fourbar_validation.compare.effect_sizes import find_size
-from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.line import find_most, place_line
 from fourbar_validation.compare.pins import (
     find_centre,
     find_inertia,
@@ -35,7 +36,6 @@ from fourbar_validation.compare.tolerance import (
     WELL_CONDITIONED,
     K,
     Mask,
-    join_components,
     magnitude,
     sum_lengths,
 )
@@ -204,9 +204,7 @@ def _sum_forces(_: str, sizes: TermSizes) -> Array:
     formulas = sizes.solution
     gain = 1.0
     if scene.drive is not None:  # a short lever makes the force as many times larger
-        short = place_line(
-            scene.linkage, scene.drive, {bar: np.zeros(1) for bar in MOVING_BARS}
-        ).most
+        short = find_most(scene.linkage, scene.drive)
         gain = max(1.0, max(scene.linkage.lengths) / short)
     return gain * _sum_force_terms(scene, formulas) / formulas.drive_condition
 
@@ -268,9 +266,6 @@ def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
     return total
 
 
-_SPEEDS = {bar: f"omega_{bar}" for bar in MOVING_BARS}
-
-
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     """Return an answer as a solution; None if it has no angles.
 
@@ -288,23 +283,24 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     if at.speed is not None and not at.moves_stroke:  # else the engine finds them
         known[f"omega_{at.bar}"] = at.speed + np.zeros(n)
         known[f"alpha_{at.bar}"] = at.acceleration + np.zeros(n)
-    speeds = {1: np.zeros(n)}
-    speeds |= {bar: known[name] for bar, name in _SPEEDS.items() if name in known}
-    moves = len(speeds) > len(MOVING_BARS)
+    motion = pose(scene.linkage, [*theta.values()])
+    omega: dict[int, Any] = {bar: known.get(f"omega_{bar}") for bar in MOVING_BARS}
+    moves = all(rate is not None for rate in omega.values())
+    omega[1] = np.zeros(n)
     if moves and at.speed is not None:
-        turning = {bar: 1j * speeds[bar] for bar in MOVING_BARS}
-        known |= _swing_points(scene.linkage, theta, turning, "v")
+        # velocities are the accelerations of a start from rest, each a rate of arms
+        known |= motion._replace(alpha=omega).swing_points("v_")
     known["sin_mu"] = np.sin(theta[4] - theta[3])
     one, second = (theta[bar] for bar in theta if bar != at.bar)
     known["condition"] = np.abs(np.sin(second - one))
     drive = state_from_pins(scene).drive
     if drive is not None:
-        line = place_line(scene.linkage, drive, theta)
-        known["drive_line"] = join_components(line.unit.real, line.unit.imag)
+        line = place_line(motion, drive)
+        known["drive_line"] = stack_components(line.unit)
         if drive.has_stroke:
             known["stroke"] = line.stroke
         if moves:
-            known["stroke_speed"] = line.speed(speeds)
+            known["stroke_speed"] = line.speed(omega)
         known.setdefault("drive_condition", line.condition)
         if isinstance(at.origin, StrokeOrigin):
             lever = line.lever
@@ -322,34 +318,6 @@ def make_reference(scene: Scene, answer: Answer) -> Solution | None:
     return Solution(at=at, stated=scene, status_code=codes, branch=at.branch, **known)
 
 
-def _swing_points(
-    linkage: FourBar,
-    theta: dict[int, Array],
-    turning: dict[int, Any],
-    letter: str,
-) -> dict[str, Any]:
-    """Return velocities ("v") or accelerations ("a") of A, B and the mass centres.
-
-    They are (n, 2), and follow from the answer's own angles and rates. `turning`: what
-    an arm of each bar is multiplied by, 1j omega or 1j alpha - omega^2.
-    """
-
-    def swing(bar: int, distance: float, angle: float) -> Any:
-        return turning[bar] * distance * np.exp(1j * (theta[bar] + angle))
-
-    points = {
-        "A": swing(2, linkage.input.length, 0.0),
-        "B": swing(4, linkage.output.length, 0.0),
-    }
-    for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
-        centre = swing(number, *find_centre(bar))
-        points[f"G{number}"] = centre + points["A"] if number == 3 else centre
-    return {
-        f"{letter}_{name}": join_components(point.real, point.imag)
-        for name, point in points.items()
-    }
-
-
 def size_answer(scene: Scene, answered: Solution | None) -> TermSizes | None:
     """Return the sizes of an answer; None without the motion that the sums need."""
     if answered is None:
@@ -359,11 +327,11 @@ def size_answer(scene: Scene, answered: Solution | None) -> TermSizes | None:
             return None
         if any(getattr(answered, f"a_G{bar}") is None for bar in MOVING_BARS):
             theta, omega, alpha = (
-                {bar: getattr(answered, f"{rate}_{bar}") for bar in MOVING_BARS}
+                {bar: answered[f"{rate}_{bar}"] for bar in MOVING_BARS}
                 for rate in ("theta", "omega", "alpha")
             )
-            turning = {bar: 1j * alpha[bar] - omega[bar] ** 2 for bar in MOVING_BARS}
-            moved = _swing_points(scene.linkage, theta, turning, "a")
-            centres = {name: moved[name] for name in moved if "G" in name}
+            motion = pose(scene.linkage, [*theta.values()])
+            moved = motion._replace(omega=omega, alpha=alpha).swing_points()
+            centres: dict[str, Any] = {f"a_G{k}": moved[f"a_G{k}"] for k in MOVING_BARS}
             answered = replace(answered, **centres)
     return TermSizes(scene, answered)

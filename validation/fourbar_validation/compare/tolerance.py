@@ -269,14 +269,6 @@ def magnitude(values: Array) -> Array:
     return np.abs(values)
 
 
-def join_components(x: Array, y: Array) -> Array:
-    """Join the components of vectors, (n, 2)."""
-    vectors = np.empty((len(x), 2))
-    vectors[:, 0] = x
-    vectors[:, 1] = y
-    return vectors
-
-
 def compute_difference(quantity: str, ours: Array, theirs: Array) -> Array:
     """Compute the differences of a quantity, (n,).
 

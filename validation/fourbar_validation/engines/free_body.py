@@ -18,7 +18,8 @@ from fourbar.linkage import MOVING_BARS, FourBar
 from fourbar.quantities import COUPLE, LINE, Array, ComplexArray
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.compare.line import DriveLine, place_line
+from fourbar_validation.compare.bodies import BodyMotion, pose, stack_components
+from fourbar_validation.compare.line import place_line
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.engines.description import (
     FORCE_AT,
@@ -34,7 +35,6 @@ from fourbar_validation.engines.free_body_closure import (
     measure_cylinder,
 )
 from fourbar_validation.engines.free_body_effects import (
-    BodyMotion,
     BodyWrenches,
     find_wound,
     has_wrench,
@@ -136,10 +136,8 @@ def _list_dynamics(
 
 def _move_bodies(linkage: FourBar, command: Command, theta: Array) -> BodyMotion:
     """Set the bars at angles (3, n) in motion as commanded; a speed left out is 0."""
-    theta_2, theta_3, theta_4 = theta
-    omega, alpha = list_speeds(command)
     return speeds_and_accelerations(
-        linkage, theta_2, omega, alpha, theta_3, theta_4, command.bar
+        pose(linkage, theta), *list_speeds(command), command.bar
     )
 
 
@@ -149,31 +147,17 @@ def _list_places(motion: BodyMotion, theta: Array) -> dict[str, Array]:
     The points are pins A, B and the mass centres.
     """
     _, theta_3, theta_4 = theta
-    places = {
-        "A": motion.first_pin[3],
-        "B": motion.first_pin[4] + motion.linkage.output.length * motion.unit[4],
-    }
-    for bar in MOVING_BARS:
-        places[f"G{bar}"] = motion.first_pin[bar] + motion.to_centre(bar)
     quantities = dict(zip(("theta_2", "theta_3", "theta_4"), theta, strict=True))
     quantities["sin_mu"] = np.sin(theta_4 - theta_3)
-    return quantities | {
-        name: stack_components(place) for name, place in places.items()
-    }
+    return quantities | motion.places()
 
 
 def _list_rates(motion: BodyMotion) -> dict[str, Array]:
     """List speeds and accelerations of bars, and accelerations of the points."""
-    a_A = motion.swing(2, motion.first_pin[3])
-    a_B = motion.swing(4, motion.linkage.output.length * motion.unit[4])
-    quantities = {"a_A": stack_components(a_A), "a_B": stack_components(a_B)}
+    quantities = motion.swing_points()
     for bar in MOVING_BARS:
-        a_G = motion.swing(bar, motion.to_centre(bar)) + (a_A if bar == 3 else 0.0)
-        quantities |= {
-            f"omega_{bar}": motion.omega[bar],
-            f"alpha_{bar}": motion.alpha[bar],
-            f"a_G{bar}": stack_components(a_G),
-        }
+        quantities[f"omega_{bar}"] = motion.omega[bar]
+        quantities[f"alpha_{bar}"] = motion.alpha[bar]
     return quantities
 
 
@@ -190,12 +174,12 @@ def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[dict[str, Array], fl
         name: unknowns[:, FORCE_COLUMNS[name] : FORCE_COLUMNS[name] + 2]
         for name in FORCE_AT.values()
     }
-    if (line := _place_line_of_drive(scene, motion)) is None:
+    if scene.drive is None:
         # the sine between the bars that are not driven
         others = [bar for bar in MOVING_BARS if bar != scene.drive_bar]
         condition = np.abs(cross_products(*(motion.unit[bar] for bar in others)))
     else:
-        condition = line.condition
+        condition = place_line(motion, scene.drive).condition
     forces["drive_condition"] = condition * from_jamming
     forces[drive.value] = unknowns[:, DRIVE_COLUMN]
     if scene.loads or scene.effects:
@@ -220,32 +204,17 @@ def _find_range_at_rest(
     return {drive.low: np.minimum(*ends), drive.high: np.maximum(*ends)}
 
 
-def _place_line_of_drive(scene: Scene, motion: BodyMotion) -> DriveLine | None:
-    if scene.drive is None:
-        return None
-    theta = {bar: np.angle(motion.unit[bar]) for bar in MOVING_BARS}
-    return place_line(scene.linkage, scene.drive, theta)
-
-
 def speeds_and_accelerations(
-    linkage: FourBar,
-    theta_2: Array,
-    speed: Array,
-    acceleration: Array,
-    theta_3: Array,
-    theta_4: Array,
-    bar: int = 2,
+    posed: BodyMotion, speed: Array, acceleration: Array, bar: int = 2
 ) -> BodyMotion:
     """Compute speeds and accelerations where those of a bar are stated.
 
     NaN where the Jacobian is singular.
     """
-    d, a, b, c = linkage.lengths
-    zero = np.zeros(len(theta_2), dtype=complex)
-    theta = {1: linkage.ground_angle + zero.real, 2: theta_2, 3: theta_3, 4: theta_4}
-    unit = {number: np.exp(1j * angle) for number, angle in theta.items()}
+    _, a, b, c = posed.linkage.lengths
     length = {2: a, 3: b, 4: c}
-    round_ = unit | {4: -unit[4]}  # bar 4 is gone along from B to O4
+    # bar 4 is gone along from B to O4
+    round_ = posed.unit | {4: -posed.unit[4]}
     others = [number for number in MOVING_BARS if number != bar]
     jacobian = np.stack(
         [stack_components(round_[number]) for number in others],
@@ -255,18 +224,17 @@ def speeds_and_accelerations(
     def rates(stated: Array, centripetal: ComplexArray) -> dict[int, Array]:
         right = stack_components(-length[bar] * stated * round_[bar] - 1j * centripetal)
         solved = solve_system(jacobian, right[..., None])[0][..., 0].T
-        found = {1: zero.real, bar: stated}
+        found = posed.omega | {bar: stated}
         for number, v in zip(others, solved, strict=True):
             found[number] = v / length[number]
         return found
 
-    omega = rates(speed, zero)
-    pull = zero
+    pull = posed.first_pin[1]
+    omega = rates(speed, pull)
     for number in MOVING_BARS:
         pull = pull + length[number] * omega[number] ** 2 * round_[number]
     alpha = rates(acceleration, pull)
-    first_pin = {1: zero, 2: zero, 3: a * unit[2], 4: d * unit[1]}
-    return BodyMotion(linkage, theta_2, unit, first_pin, omega, alpha)
+    return posed._replace(omega=omega, alpha=alpha)
 
 
 def balance(
@@ -407,9 +375,10 @@ def _make_matrix(scene: Scene, motion: BodyMotion) -> Array:
         u = motion.unit[bar]
         matrix[:, row + 2, FORCE_COLUMNS[second]] = -u.imag
         matrix[:, row + 2, FORCE_COLUMNS[second] + 1] = u.real
-    if (line := _place_line_of_drive(scene, motion)) is None:
+    if scene.drive is None:
         matrix[:, EQUATION_ROWS[scene.drive_bar][0] + 2, DRIVE_COLUMN] = 1.0
     else:
+        line = place_line(motion, scene.drive)
         unit = BodyWrenches(len(motion.theta_2))
         for (sense, point), arm in zip(line.drive.ends, line.arms, strict=True):
             unit.push(point.bar, sense * line.unit, arm)
@@ -432,8 +401,3 @@ def _compute_distance_from_jamming(matrix: Array) -> Array:
     far[finite] = np.linalg.svd(matrix[finite], compute_uv=False)[:, -1]
     least: Array = np.minimum(far, 1.0)
     return least
-
-
-def stack_components(vectors: ComplexArray) -> Array:
-    """Return x and y of vectors (n,) as (n, 2), as they lie in memory."""
-    return vectors.view(float).reshape(-1, 2)

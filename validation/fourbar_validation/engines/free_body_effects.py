@@ -4,18 +4,18 @@ A table leads from its kind to its wrench. Definitions as in docs/scene-file.md,
 the numbers of the description alone. Vectors of the plane are complex numbers, x + i y.
 """
 
-import cmath
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fourbar.linkage import MOVING_BARS, PINS, FourBar
+from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import Array, ComplexArray
 from fourbar.scene import Scene, command, find_signs
-from fourbar_validation.compare.pins import find_centre, find_mass
+from fourbar_validation.compare.bodies import BodyMotion, make_vector
+from fourbar_validation.compare.pins import find_mass
 from fourbar_validation.engines.description import declares, look_up
 from fourbar_validation.engines.free_body_closure import close, cross_products
 
@@ -23,54 +23,6 @@ GREATEST_WINDING = math.pi * (1.0 - 1e-12)
 """Greatest winding of a spring from rest, rad: half a turn less the rounding of an
 angle of several turns.
 """
-
-
-class BodyMotion(NamedTuple):
-    """The bars at n positions, by number, each (n,); the ground is bar 1."""
-
-    linkage: FourBar
-    theta_2: Array
-    unit: dict[int, ComplexArray]
-    """Directions e^{i theta}."""
-    first_pin: dict[int, ComplexArray]
-    """Place of the first pin of each bar (O2, O2, A, O4), m."""
-    omega: dict[int, Array]
-    alpha: dict[int, Array]
-    beginning: dict[int, Array] | None = None
-    """Speeds of the motion that is about to begin where the linkage rests, rad/s. None:
-    it stays at rest.
-    """
-
-    def to_centre(self, bar: int) -> ComplexArray:
-        """Return the vector from a moving bar's first pin to its mass centre, m."""
-        return self.unit[bar] * make_vector(find_centre(self.linkage.bar(bar)))
-
-    def swing(self, bar: int, arm: ComplexArray) -> ComplexArray:
-        """Return the acceleration of the end of an arm about its bar's first pin.
-
-        The unit is m/s^2.
-        """
-        return (1j * self.alpha[bar] - self.omega[bar] ** 2) * arm
-
-    def slip(self, pin: str) -> Array:
-        """Return omega_j - omega_i of the bars that meet at a pin, rad/s."""
-        i, j = PINS[pin]
-        return self.omega[j] - self.omega[i]
-
-    def sense(self, pin: str) -> Array:
-        """Return the sign of the slip; at rest, that of the motion about to begin."""
-        slip = self.slip(pin)
-        if self.beginning is None:
-            return np.sign(slip)
-        of_i, of_j = (self.beginning[bar] for bar in PINS[pin])
-        begins = of_j - of_i
-        as_one = np.abs(begins) < _TURNS_AS_ONE * (np.abs(of_j) + np.abs(of_i))
-        moves = np.any([self.omega[bar] for bar in MOVING_BARS], axis=0)
-        return np.sign(np.where(moves, slip, np.where(as_one, 0.0, begins)))
-
-
-_TURNS_AS_ONE = 64.0 * 2.0**-52
-"""Two bars whose speeds differ by less than this part of them turn as one."""
 
 
 class BodyWrenches:
@@ -112,11 +64,6 @@ they are reached.
 """
 FOLLOWED = np.radians(2.0)
 """Step in which angles are followed from where a motion begins, rad."""
-
-
-def make_vector(pair: Any) -> complex:
-    """Return (distance, angle) as a vector."""
-    return cmath.rect(*pair)
 
 
 def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
@@ -173,16 +120,7 @@ def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -
     The line has no direction where they coincide.
     """
     for spring in effect.springs:
-        arms = [
-            motion.unit[point.bar] * make_vector((point.distance, point.angle))
-            for point in (spring.start, spring.end)
-        ]
-        across = (
-            motion.first_pin[spring.end.bar]
-            + arms[1]
-            - motion.first_pin[spring.start.bar]
-            - arms[0]
-        )
+        arms, across = motion.lay((spring.start, spring.end))
         if spring.preload == spring.stiffness * spring.length:
             pull = spring.stiffness * across
         else:

@@ -18,7 +18,6 @@ from fourbar.effects import (
     Flywheel,
     Friction,
     Gravity,
-    LinearDrive,
     Load,
     PinFriction,
     Place,
@@ -41,7 +40,7 @@ from fourbar.studies.keys import (
     read_place,
     replace_number,
 )
-from fourbar_validation.compare.line import place_line
+from fourbar_validation.compare.bodies import pose, stack_components
 from fourbar_validation.compare.pins import (
     find_centre,
     find_inertia,
@@ -58,7 +57,6 @@ from fourbar_validation.compare.tolerance import (
     find_condition,
     find_error,
     find_worst,
-    join_components,
     magnitude,
     mark_touching,
     sum_lengths,
@@ -265,13 +263,13 @@ def _take_plain_positions(question: Question) -> _Few:
         & (solution.drive_condition >= WELL_CONDITIONED)
         & ~question.reversing(_AT_A_REVERSAL)
     )
-    theta = {bar: getattr(solution, f"theta_{bar}") for bar in MOVING_BARS}
+    posed = pose(link, [solution.theta_2, solution.theta_3, solution.theta_4])
     for effect in placed.effects:
         for spring in effect.springs if isinstance(effect, Springs) else ():
             # where its ends nearly meet rounding turns its line, whatever the loop's
             # condition
-            line = place_line(link, LinearDrive(spring.start, spring.end), theta)
-            fit &= line.stroke >= WELL_CONDITIONED * sum_lengths(link)
+            _, across = posed.lay((spring.start, spring.end))
+            fit &= np.abs(across) >= WELL_CONDITIONED * sum_lengths(link)
     indices = np.flatnonzero(fit)
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
@@ -331,7 +329,7 @@ def _measure_moved(
         values = other[name] / size ** _POWERS.get(UNITS[name], 0)
         if name in PIN_FORCES:
             turned = (values @ np.array([1.0, 1j])) * cmath.rect(1.0, -turn)
-            return join_components(turned.real, sense * turned.imag)
+            return stack_components(turned if sense > 0.0 else turned.conj())
         if name in ("drive_force", "power"):
             return values
         return sense * (values - turn * name.startswith("theta"))
