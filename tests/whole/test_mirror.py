@@ -47,7 +47,7 @@ fourbar/show/test_page.py | tolerances
 fourbar/show/plot/test_plot.py | figures freebody labels linkage_figure style
 fourbar/show/plot/test_plot.py | tolerance_figures view
 # a comparison is tested by engines with given answers
-validation/run/test_judge.py | validation/compare: answer effect_sizes
+validation/run/test_judge.py | validation/compare: answer bodies effect_sizes
 validation/run/test_judge.py | command identities judge_engines law question
 validation/run/test_parts.py | plan request
 # adapters: judged against printed figures, each other, and faults put in front of
