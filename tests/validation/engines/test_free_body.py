@@ -78,7 +78,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
             f"{engines}{name}"
             for name in ("free_body", "description", "linear", "sliding")
         ),
-        *(f"{compare}{name}" for name in ("answer", "line", "pins")),
+        *(f"{compare}{name}" for name in ("answer", "bodies", "line", "pins")),
     )
     for module in (free_body, free_body_closure, free_body_effects):
         modules = imported(Path(module.__file__))
