@@ -61,8 +61,10 @@ def fields(kind: type) -> list[tuple[str, str, str]]:
     return rows + (fields(Quantities) if Quantities in kind.__bases__ else [])
 
 
-NOT_STATED = ("init=False)", "kw_only=True)")
-"""Ends of fields that nobody states: those of a solution, which `solve` makes."""
+NOT_STATED = "init=False)"
+"""End of a field that nobody states, as nobody states those of a solution that have
+defaults: `solve` makes it.
+"""
 
 
 def signature(thing: Any) -> str:
@@ -80,6 +82,7 @@ def signature(thing: Any) -> str:
             if isinstance(statement, ast.AnnAssign)
             and not is_of_class(statement)
             and not ast.unparse(statement).endswith(NOT_STATED)
+            and not (thing is fourbar.Solution and statement.value is not None)
         ]
         return f"({', '.join(arguments)})"
     node.args.args = [argument for argument in node.args.args if argument.arg != "self"]

@@ -8,10 +8,18 @@ import cmath
 import math
 from collections.abc import Container
 from contextlib import suppress
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from functools import cache
 from numbers import Integral
-from typing import Annotated, Any, ClassVar, NamedTuple, TypeVar, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    NamedTuple,
+    TypeVar,
+    dataclass_transform,
+    get_type_hints,
+)
 
 import numpy as np
 
@@ -41,6 +49,15 @@ ANY_NUMBER, AT_LEAST_ZERO, POSITIVE = (
     "a finite number > 0",
 )
 """Bounds of a number, as errors say them."""
+
+
+Description = TypeVar("Description")
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def record(kind: Description) -> Description:
+    """Make a class a frozen dataclass with slots."""
+    return dataclass(frozen=True, slots=True)(kind)  # type: ignore[return-value, arg-type]
 
 
 def is_within(number: Any, bound: str) -> Any:
@@ -392,9 +409,6 @@ def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
     return require(key, size, unit, bound), require(key, other, second, of_second)
 
 
-Description = TypeVar("Description")
-
-
 def copy_with(description: Description, /, **changed: Any) -> Description:
     """Return a frozen description with some fields changed, itself where none is.
 
@@ -419,7 +433,7 @@ def list_fields(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Bar(Described):
     """A moving bar; massless unless stated otherwise.
 
@@ -557,7 +571,7 @@ class Bar(Described):
         return cmath.rect(*self.mass_centre)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FourBar(Described):
     """A four-bar linkage: ground length d and angle theta_1 (O2 to O4), three bars.
 

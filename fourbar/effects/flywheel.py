@@ -1,14 +1,13 @@
 """A flywheel on a bar that ground carries: more inertia, and no weight."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fourbar.effects.effect import Effect
-from fourbar.linkage import AT_LEAST_ZERO, Declared, OfBar
+from fourbar.linkage import AT_LEAST_ZERO, Declared, OfBar, record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Flywheel(Effect):
     """A wheel that turns with the driven bar about its fixed pin.
 

@@ -13,7 +13,6 @@ for the coefficients h_k, and so is finite where these are not.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import NO_DIGIT_LEFT
 from fourbar.formulas.pin_forces import Body
-from fourbar.linkage import ENDS, MOVING_BARS, PINS, Declared, FourBar, OneOf
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, Declared, FourBar, OneOf, record
 from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
@@ -144,7 +143,7 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
     return bars
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LinearDrive(Line, ForceDrive):
     """A force along the line between two points, as of a cylinder.
 
@@ -184,7 +183,7 @@ class LinearDrive(Line, ForceDrive):
         actions.pull(self.end, self.start, force * direction)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PointDrive(ForceDrive):
     """A force at a place of bar 2, 3 or 4 in a direction, N, positive along it.
 

@@ -1,15 +1,14 @@
 """Dry pin friction of constant torque, against the relative rotation at a pin."""
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.arithmetic import is_any
 from fourbar.formulas.motion import State
-from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
+from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar, record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Friction(PinRows):
     """Friction torques per pin, N m, as pairs (pin, value).
 

@@ -1,16 +1,15 @@
 """Gravity: m g at the mass centre of every bar that has mass."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fourbar.effects.effect import Actions, Effect
 from fourbar.formulas.arithmetic import is_any, polar, vector
 from fourbar.formulas.motion import State
-from fourbar.linkage import MOVING_BARS, Declared, FourBar
+from fourbar.linkage import MOVING_BARS, Declared, FourBar, record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Gravity(Effect):
     """A uniform field of some magnitude (m/s^2) and direction (rad, from +x, ccw)."""
 

@@ -4,7 +4,7 @@ A load is constant or a table over theta_2.
 """
 
 import math
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -34,6 +34,7 @@ from fourbar.linkage import (
     OneOf,
     Part,
     Text,
+    record,
 )
 
 _BEYOND_TURN = 2.0 * PI_LOW
@@ -44,7 +45,7 @@ PLACES_OF_LOADS = ("from_pin", "from_centre", "point", "arm")
 """Keys of which one says where a force acts."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Table(Described):
     """Factor of a load over theta_2, linear between its points, modulo a turn.
 
@@ -147,7 +148,7 @@ class Table(Described):
         raise InputError("loads.table.theta_2", None, allowed)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Load(Effect):
     """A force and a couple on a moving bar, at a place that turns with the bar.
 

@@ -13,7 +13,6 @@ solution from 0 and the other one from far away.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -22,7 +21,7 @@ from fourbar.effects.effect import Actions, PinRows, SolvedFriction
 from fourbar.formulas.arithmetic import is_any, make_like
 from fourbar.formulas.longer import take_doubles
 from fourbar.formulas.pin_forces import PinForces
-from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared
+from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared, record
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array, Codes, Mask
 
 ONE_SOLUTION, NO_SOLUTION, MANY = range(3)
@@ -51,7 +50,7 @@ STARTS_AT_ONCE = 10_000
 """Starts that are followed at a time: each problem has all its own in memory."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PinFriction(PinRows):
     """Pins as (pin, coefficient of friction mu, pin radius r in m).
 

@@ -1,6 +1,6 @@
 """Linear springs, each between two points of two bars, the ground included."""
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from fourbar.linkage import (
     Entries,
     FourBar,
     OneOf,
+    record,
 )
 from fourbar.quantities import NO_DIRECTION, OK, Codes, Signs
 
@@ -31,7 +32,7 @@ SENSES = ("push", "pull")
 """Senses in which a spring that acts one way may act."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Spring(Line):
     """A spring that pulls its two points together.
 
@@ -156,7 +157,7 @@ class Spring(Line):
         return np.abs(self.across(state)) + self.slack / self.stiffness
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Springs(Effect):
     """Linear springs.
 

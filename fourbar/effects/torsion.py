@@ -2,7 +2,6 @@
 
 import math
 from copy import copy
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,14 +12,14 @@ from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES_OF_BARS
 from fourbar.formulas.position import reorder_lengths
-from fourbar.linkage import PINS, POSITIVE, Declared, FourBar
+from fourbar.linkage import PINS, POSITIVE, Declared, FourBar, record
 from fourbar.quantities import OK, WOUND, Array, Codes, Signs
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
 """rad; at half a turn itself rounding would decide in which sense the spring turns."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Torsion(PinRows):
     """Springs as (pin, stiffness in N m/rad, rest angle in rad, preload in N m).
 

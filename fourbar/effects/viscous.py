@@ -1,14 +1,13 @@
 """Viscous pin damping: a couple proportional to the relative angular velocity."""
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from fourbar.effects.effect import Actions, PinRows
 from fourbar.formulas.motion import State
-from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar
+from fourbar.linkage import AT_LEAST_ZERO, Declared, FourBar, record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Viscous(PinRows):
     """Damping coefficients per pin, N m s/rad, as pairs (pin, value)."""
 

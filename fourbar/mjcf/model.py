@@ -3,14 +3,13 @@
 import cmath
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.errors import InputError, write_in_units
-from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar
+from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS, PINS, FourBar, record
 
 if TYPE_CHECKING:
     from fourbar.effects import LinearDrive, Load
@@ -28,7 +27,7 @@ the rounding of positions by its time constant squared; measured, accelerations 
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Settings:
     """Settings of MuJoCo in the file.
 

@@ -4,14 +4,13 @@ The plane is tilted about an axis and moved to an origin.
 """
 
 import math
-from dataclasses import dataclass
 from operator import add
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import require
+from fourbar.linkage import record, require
 from fourbar.mjcf.model import write_exactly
 from fourbar.quantities import Array
 
@@ -22,7 +21,7 @@ _ROUNDING = 2.0**-50
 """Part of a vector's length below which a turned component is rounding of zero."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Plane:
     """Frame in which a linkage stands: x and y in its plane, z along its axes.
 

@@ -1,12 +1,19 @@
 """A linkage as it is drawn: the places of its four pins in the plane of the drawing."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fourbar.errors import InputError
 from fourbar.formulas.arithmetic import cross, vector
-from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, PINS, Declared, Described
+from fourbar.linkage import (
+    BAR_NAMES,
+    ENDS,
+    FIRST_PIN,
+    PINS,
+    Declared,
+    Described,
+    record,
+)
 
 DRAWN_WORD = "drawn"
 """Word that stands for the drawn angle, stroke or side; key of a drawn place."""
@@ -17,7 +24,7 @@ DRAWN_PLACE = Declared("m", pair="m")
 """x and y of a place in the drawing."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class DrawnPins(Described):
     """Places of the pins, each (x, y), m or texts with units.
 

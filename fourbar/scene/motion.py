@@ -30,6 +30,7 @@ from fourbar.linkage import (
     Listed,
     OneOf,
     Whole,
+    record,
     require,
     require_numbers,
     require_whole,
@@ -80,7 +81,7 @@ LAW_KINDS = (*RISE_LAWS, SINE_LAW)
 """Kinds of a law that is no table."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Sweep:
     """The commanded angle from `start` to `stop` (rad) in `steps` equal intervals.
 
@@ -97,7 +98,7 @@ class Sweep:
         object.__setattr__(self, "steps", steps)  # the class is frozen
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FromLimit(Described):
     """Limit position number `limit` of the commanded bar, plus `offset` (rad).
 
@@ -109,7 +110,7 @@ class FromLimit(Described):
     stated_at = "motion.theta_2"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Free(Described):
     """Released motion for `duration` (s), reported at `steps` equal intervals.
 
@@ -162,7 +163,7 @@ class _OverTime:
         return np.linspace(self.time[0], self.time[-1], self.steps + 1)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Law(Described, _OverTime):
     """theta_2(t) through the points of a table.
 
@@ -288,7 +289,7 @@ def _rise(kind: str, time: Array, duration: float) -> tuple[Array, Array, Array]
     return angle, speed / duration, acceleration / (duration * duration)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Rise(Described, _OverTime):
     """An angle that rises by a standard law, dwells, falls and rests.
 
@@ -360,7 +361,7 @@ class Rise(Described, _OverTime):
         return place, angle * speed, angle * acceleration
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Sine(Described, _OverTime):
     """theta_2 = mean + amplitude sin(frequency t + phase), from t = 0 on.
 

@@ -4,7 +4,6 @@ Units are declared where the numbers belong.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fourbar import effects
@@ -27,6 +26,7 @@ from fourbar.linkage import (
     FourBar,
     OfBar,
     list_declared,
+    record,
     require,
 )
 from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
@@ -38,7 +38,7 @@ POINT_STAGES = {"": "position", "v_": "velocity", "a_": "acceleration"}
 """Quantities evaluated for a point: the prefix of the name and the stage."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Point(Placed):
     """A point of a bar.
 
@@ -166,7 +166,7 @@ def _collect_numbers(kind: Any) -> dict[str, Declared]:
     return numbers
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Tolerance:
     """Tolerance of one number of a scene.
 

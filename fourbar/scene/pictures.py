@@ -7,7 +7,7 @@ or below, no other, and what is read there must be a picture of moderate size.
 
 import base64
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Self
 
@@ -19,6 +19,7 @@ from fourbar.linkage import (
     Declared,
     Described,
     Text,
+    record,
     require_bar,
 )
 from fourbar.writing import read_bytes
@@ -87,7 +88,7 @@ class _PictureFile:
         return replace(self, name=name, folder=os.fspath(folder))  # type: ignore[type-var]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TracedPicture(_PictureFile, Described):
     """The picture that lies under the drawing in the workbench.
 
@@ -128,7 +129,7 @@ class TracedPicture(_PictureFile, Described):
         return content, kind
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Picture(_PictureFile):
     """The picture of a moving bar.
 

@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -33,7 +33,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.formulas.path import NO_DIGIT_LEFT, count_turns, prepare_path
 from fourbar.formulas.position import vanish
-from fourbar.linkage import BAR_NAMES, Entries, FourBar, copy_with, require_bar
+from fourbar.linkage import BAR_NAMES, Entries, FourBar, copy_with, record, require_bar
 from fourbar.quantities import Array, Indices, Signs
 from fourbar.scene.drawing import DrawnPins
 from fourbar.scene.motion import (
@@ -61,7 +61,7 @@ def load_show(module: str) -> Any:
     return import_module(f"fourbar.show.{module}")
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Scene:
     """A linkage and everything that is stated about it.
 

@@ -7,13 +7,13 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import dedent
 
 import click
 
 from fourbar.errors import DependencyError, InputError
+from fourbar.linkage import record
 from fourbar_validation.engines.environments import make_environment, read_engines
 from fourbar_validation.engines.programs import run_to_end
 from fourbar_validation.places import CHECKOUT
@@ -34,7 +34,7 @@ is then 1.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Reproduction:
     """Docstring of a script of docs/findings, in parts."""
 

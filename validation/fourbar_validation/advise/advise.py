@@ -7,7 +7,7 @@ closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be lon
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import click
 import numpy as np
 
 from fourbar.errors import InputError, LimitError
+from fourbar.linkage import record
 from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
@@ -108,7 +109,7 @@ They are tried beside RK4 with tolerance 0, ten iterations and pads, which is ""
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SearchRun:
     """One run of the search."""
 
@@ -129,7 +130,7 @@ class SearchRun:
         return describe_settings(self.settings, self.steps_per_revolution)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Advice:
     """Settings that reach a required error, or the most accurate ones tried."""
 

@@ -5,11 +5,12 @@ The error is measured with one setting changed at a time.
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from fourbar.linkage import record
 from fourbar.mjcf import Settings
 from fourbar.mjcf.document import (
     LIGHT_BAR_RATIO,
@@ -49,7 +50,7 @@ _MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SettingInfluence:
     """One setting changed alone."""
 

@@ -28,7 +28,7 @@ from unicodedata import normalize
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import MOVING_BARS
+from fourbar.linkage import MOVING_BARS, record
 from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array, find_derived
 from fourbar.solution import find_unit_of_quantity
 from fourbar.writing import read_text
@@ -136,7 +136,7 @@ The name may stand between bars.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Unit:
     """Unit of the numbers of a column."""
 

@@ -5,11 +5,11 @@ A law is an exponent with its uncertainty; floors and jumps are found too.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 
+from fourbar.linkage import record
 from fourbar_validation.advise.worst_errors import ERROR_NAMES
 from fourbar_validation.cost.work_precision import CostPoint
 
@@ -40,7 +40,7 @@ _EXPECTED_ORDER = dict.fromkeys(
 ) | {"RK4": _FOURTH_ORDER}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ErrorLaw:
     """error ~ setting_value^exponent of one quantity over the points used."""
 

@@ -5,9 +5,10 @@ The other settings are the recommended ones or MuJoCo's defaults.
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from fourbar.linkage import record
 from fourbar.mjcf import Settings
 from fourbar.scene import Scene
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
@@ -34,7 +35,7 @@ INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete", "RK4")
 """Integrators, all that MuJoCo 4.0 has."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Spot:
     """One setting of one curve."""
 
@@ -46,7 +47,7 @@ class Spot:
     """The value of the curve's setting, where it is not the steps."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SettingCurve:
     """A row of settings that differ in one number."""
 

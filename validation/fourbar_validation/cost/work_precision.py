@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from fourbar.errors import FourBarError, LimitError
 from fourbar.files import dump
 from fourbar.formulas.mobility import turns_fully
+from fourbar.linkage import record
 from fourbar.scene import Command, Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
@@ -57,7 +58,7 @@ PINOCCHIO = "Pinocchio, rnea and multipliers"
 MUJOCO_INVERSE = "MuJoCo, mj_inverse and multipliers"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CostPoint:
     """One setting of one method: its errors, and what it costs."""
 

@@ -14,7 +14,7 @@ import sys
 import sysconfig
 import tomllib
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import requires
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from typing import Any
 from filelock import FileLock
 
 from fourbar.errors import DependencyError, InputError, list_allowed
+from fourbar.linkage import record
 from fourbar.writing import read_text, write_text
 from fourbar_validation.engines.guests import (
     Guest,
@@ -59,7 +60,7 @@ _DONE = "installed"
 """File in the folder of an environment that is complete."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class EngineEntry:
     """One table of engines.toml."""
 

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from fourbar.effects import Springs
 from fourbar.errors import InputError
+from fourbar.linkage import record
 from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES, Array
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
@@ -51,7 +52,7 @@ _Read = TypeVar("_Read")
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Hello:
     """First message of an engine, which states what it answers, checked."""
 
@@ -67,7 +68,7 @@ class Hello:
     made_for: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Guest(Engine):
     """Engine in a process outside."""
 

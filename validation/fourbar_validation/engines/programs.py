@@ -22,6 +22,7 @@ from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from fourbar.linkage import record
 from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import (
     LONGEST_REASON,
@@ -324,7 +325,7 @@ class _KilledError(EngineError):
     """The program was killed, by itself or from outside."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Program:
     """A command line, and what it is started with."""
 

@@ -4,7 +4,7 @@ The line says what starts the engine, what it needs, and how it is judged.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.errors import say_install
+from fourbar.linkage import record
 from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS, Array
 from fourbar.scene import Command, LimitOrigin, Scene
 from fourbar.solution import Solution
@@ -49,7 +50,7 @@ Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Engine:
     """An independent solver, and what it is held to."""
 
@@ -185,7 +186,7 @@ _OF_A_POSITION = tuple(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Later:
     """Class or function that is imported when it is called.
 

@@ -11,12 +11,13 @@ import shutil
 import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import InputError
+from fourbar.linkage import record
 from fourbar.writing import name_file, write_text
 from fourbar_validation.compare.results_file import count_rows, read_columns, read_frame
 from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
@@ -44,7 +45,7 @@ MOST_ROWS_COMPARED = 3_000_000
 """Rows of a run that are held in memory at once, in four gigabytes."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class About:
     """Versions, machine and settings with which a run was made."""
 
@@ -175,7 +176,7 @@ def _hash_own(kept: Mapping[str, Any]) -> str:
 NOTHING_KNOWN = About({}, "unknown machine", {})
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Recorded:
     """A recorded run, read from its folder.
 

@@ -6,8 +6,8 @@ pass, so the rules themselves are kept with a run.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
+from fourbar.linkage import record
 from fourbar_validation.compare.tolerance import IDENTITY, ErrorBound, K
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
@@ -57,7 +57,7 @@ def _describe_bound(bound: ErrorBound) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Weakening:
     """A rule that is weaker than it was."""
 

@@ -5,11 +5,11 @@ Two runs are compared where these are the same.
 
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from fourbar.errors import FourBarError
 from fourbar.files import dump
+from fourbar.linkage import record
 from fourbar.scene import Scene
 from fourbar_validation.scenes.suites import Suite
 
@@ -67,7 +67,7 @@ def _flatten_entries(key: str, value: Any) -> Iterable[tuple[str, str]]:
         yield key, str(value)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SceneChange:
     """Entries that a scene states now and stated before."""
 

@@ -4,9 +4,9 @@ Every number leads to its row in results.csv, which the page carries.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from fourbar.linkage import record
 from fourbar.quantities import LINE, UNKNOWNS
 from fourbar_validation.compare.rows import (
     FAILS,
@@ -66,7 +66,7 @@ class SectionFigure(NamedTuple):
     svg: str
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Section:
     """A part of the report that another module provides: text, pictures and a table.
 
@@ -86,7 +86,7 @@ class Section:
     """The columns that hold numbers: from, up to."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _SceneView:
     """Data of one scene that the page shows."""
 

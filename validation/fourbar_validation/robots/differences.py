@@ -7,13 +7,13 @@ import cmath
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fourbar.effects import Gravity
-from fourbar.linkage import Bar
+from fourbar.linkage import Bar, record
 from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene
 from fourbar.studies.keys import list_entries, read_number, replace_number
@@ -50,7 +50,7 @@ _Errors = dict[tuple[str, str], float]
 """Errors by method and quantity."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Difference:
     """One entry that is not the same in both files, and its cost."""
 

@@ -5,12 +5,13 @@ differences are corrected in their file.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from fourbar.formulas.mobility import change_points
+from fourbar.linkage import record
 from fourbar.quantities import COUPLE, OK, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import COMMAND_NAMES
@@ -81,7 +82,7 @@ _LENGTHS_FIRST = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LoopJudgement:
     """Report on the loop of a user's file that is nearest to a scene."""
 

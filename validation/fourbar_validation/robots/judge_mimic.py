@@ -6,14 +6,14 @@ A joint equality's polynomial is held against the four-bar that it stands for.
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import require
+from fourbar.linkage import record, require
 from fourbar.quantities import CHANGE_POINT, OK, Array
 from fourbar.scene import Command, Scene, command
 from fourbar.solving import solve
@@ -43,7 +43,7 @@ ROW = "{:6}  {:22}  {:>10}  {:>8}"
 """Format of a row under FIT_HEADINGS; its polycoef stands on a line below it."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _MimicError:
     """Largest errors of a polynomial over the motion."""
 
@@ -57,7 +57,7 @@ class _MimicError:
     """Largest error of the follower's speed over omega_2."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _MimicReport:
     """Losses of the polynomial of a file, and of others."""
 

@@ -5,14 +5,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import require
+from fourbar.linkage import record, require
 from fourbar.quantities import OK, STATUS_NAMES, UNITS
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
@@ -47,7 +47,7 @@ either way.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class InsideError:
     """Worst error of one quantity of a loop by one method."""
 

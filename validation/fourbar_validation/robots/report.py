@@ -6,7 +6,6 @@ Forms are for the terminal, in Markdown, and as CSV.
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -14,6 +13,7 @@ import numpy as np
 
 from fourbar.errors import write_count
 from fourbar.formulas.mobility import change_points, find_limit_angles
+from fourbar.linkage import record
 from fourbar.quantities import PIN_FORCES, UNITS
 from fourbar.scene import command
 from fourbar.writing import write_text
@@ -87,7 +87,7 @@ forces are sizes.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TextTable:
     """Rows of text under headings."""
 
@@ -97,7 +97,7 @@ class TextTable:
     """First columns that are words; the others are numbers."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Typed:
     """Element of MJCF to paste."""
 

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fourbar.errors import InputError
+from fourbar.linkage import record
 from fourbar.quantities import Array
 
 DEFAULT_GRAVITY = "0 0 -9.8"
@@ -183,7 +184,7 @@ def _make_pose_matrix(element: ET.Element) -> Array:
     return matrix
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Member:
     """A model, link, joint or frame; names are full ones."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fourbar.errors import FAILED, DependencyError, InputError
+from fourbar.linkage import record
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -93,7 +94,7 @@ def show_progress(scenes: int) -> Iterator[Progress]:
         yield Progress(bars, scenes)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Job:
     """One scene of a task, for a worker.
 

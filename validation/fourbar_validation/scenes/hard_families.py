@@ -6,7 +6,7 @@ A family is a generator, and one line on what must happen.
 import math
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fourbar.effects import Gravity, Load
-from fourbar.linkage import Bar, FourBar, Lengths
+from fourbar.linkage import Bar, FourBar, Lengths, record
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.scene.motion import BRANCH_NAMES, Free, Motion, Sweep
@@ -378,7 +378,7 @@ def released(
         yield f"{duration:g} s", Scene(linkage, motion, effects=(Gravity(),))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Family:
     """Scenes of one kind of difficulty."""
 

@@ -5,7 +5,7 @@ Every scene follows from its family and a random generator alone.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ from fourbar.effects import (
 )
 from fourbar.effects.load import FRAMES
 from fourbar.formulas.mobility import choose_range
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar, Lengths
+from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar, Lengths, record
 from fourbar.scene import Scene
 from fourbar.scene.motion import CROSSED, OPEN, Motion, Sweep
 
@@ -69,7 +69,7 @@ PUSHED = 0.2
 """Share of the scenes of the suites that a force at a point drives."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Ranges:
     """Distributions from which a random scene is drawn."""
 
@@ -113,7 +113,7 @@ DrawnLinkage = tuple[Sequence[float], DrawAngle]
 """Lengths (ground, input, coupler, output), m, and the angles commanded."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RandomFamily:
     """Random scenes of one kind."""
 

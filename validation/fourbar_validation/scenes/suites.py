@@ -7,7 +7,7 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -15,6 +15,7 @@ from typing import Protocol
 from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
+from fourbar.linkage import record
 from fourbar.scene import Scene
 from fourbar.scene.motion import Free, Law, Rise, Sine, Sweep, require_steps
 from fourbar.scene.scene import default_places
@@ -62,7 +63,7 @@ class Suite(Protocol):
         return self, index
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Files(Suite):
     """Scene files, read once so that a run judges what it began with."""
 
@@ -92,7 +93,7 @@ class Files(Suite):
         return hashlib.sha256(repr(self.texts).encode()).hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Random(Suite):
     """`count` random linkages of the given types, or uneven ones.
 

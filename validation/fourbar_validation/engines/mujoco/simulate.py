@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Container
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from fourbar.effects import PointDrive
 from fourbar.errors import InputError, LimitError
+from fourbar.linkage import record
 from fourbar.mjcf import RECIPE, Settings, write_mjcf
 from fourbar.mjcf.model import CYLINDER, unwind
 from fourbar.scene import Command, Scene
@@ -79,7 +80,7 @@ _RESIDUALS = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MujocoSimulated:
     """Engine "mujoco-simulated"."""
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fourbar.linkage import BAR_NAMES, MOVING_BARS
+from fourbar.linkage import BAR_NAMES, MOVING_BARS, record
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
@@ -41,7 +41,7 @@ SETTINGS_OF_AN_SDF = (
 )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotFile:
     """Screened text of a robot's file with its includes, and its meshes."""
 
@@ -56,7 +56,7 @@ class RobotFile:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PoseOptions:
     """Pose of a robot, and the joints that are held or drive in it."""
 
@@ -70,7 +70,7 @@ class PoseOptions:
     """Joint that is driven; None: that of a motor."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class MeasureOptions:
     """Request for measurements of the loops of a robot."""
 
@@ -97,7 +97,7 @@ class MeasureOptions:
         return replace(scene, motion=scene.motion.replace(speed=self.speed))
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotLoop:
     """Planar four-bar in a robot's model; ids are those of MuJoCo's compiled model.
 
@@ -218,7 +218,7 @@ class RobotLoop:
         return ", ".join(texts) + " mm"
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotClosure:
     """One equality of a robot: the four-bar that it closes, or why it closes none."""
 
@@ -230,7 +230,7 @@ class RobotClosure:
     """Kind, ground, joints, lengths, gap and softness, or the reason."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotReport:
     """Closures of a robot, and what was done to the file and its pose to see them."""
 
@@ -238,7 +238,7 @@ class RobotReport:
     notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LoopScene:
     """A scene from a loop, and what it does not hold."""
 
@@ -456,7 +456,7 @@ class InsideAnswer:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TornState:
     """State of the largest gap under a motor's torque."""
 
@@ -468,7 +468,7 @@ class TornState:
     """Of PIN_FORCES in the scene's axes, (4, 2), N; empty without an answer."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TriedSettings:
     """Settings and what they reach in the robot's file."""
 
@@ -497,7 +497,7 @@ class TriedSettings:
         return self.deciding.error
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SettingsAdvice:
     """Settings and errors of one loop, for one wanted error."""
 
@@ -523,7 +523,7 @@ class SettingsAdvice:
         return self.best.error <= self.wanted
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LoopMeasurement:
     """Results of MuJoCo on one loop in its whole robot."""
 
@@ -605,7 +605,7 @@ class LoopMeasurement:
         return bool(speeds.any()) and len(speeds) + len(self.states.open) > 1
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotMeasurement:
     """Results of MuJoCo on the loops of a robot's file."""
 

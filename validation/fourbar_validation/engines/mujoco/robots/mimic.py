@@ -3,14 +3,14 @@
 import cmath
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import Bar
+from fourbar.linkage import Bar, record
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -38,7 +38,7 @@ _SAME_CENTRE = 0.05
 """Relative difference of a mass centre's distance: files state two digits."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class JointEquality:
     """The position of a joint as a polynomial of that of another.
 

@@ -9,7 +9,7 @@ closure is then closed onto the assembly of the scene.
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import mujoco
@@ -18,7 +18,7 @@ import numpy as np
 from fourbar.effects import Gravity
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import find_circuit
-from fourbar.linkage import ENDS
+from fourbar.linkage import ENDS, record
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
@@ -81,7 +81,7 @@ angles of a pose have six digits.
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class LoopOfScene:
     """A loop of a file that a scene is held against."""
 

@@ -14,14 +14,14 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import require
+from fourbar.linkage import record, require
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_named,
@@ -52,7 +52,7 @@ _OTHER_SCALE = 1e3
 """
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CompiledRobot:
     """Compiled model of a robot's file."""
 
@@ -263,7 +263,7 @@ OUTSIDE_A_RANGE = 1e-6
 """rad or m; a joint is outside its range beyond the rounding of a file."""
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PosedRobot:
     """A robot's file, compiled and brought into a pose."""
 
