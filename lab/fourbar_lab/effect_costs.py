@@ -33,39 +33,25 @@ from fourbar_validation.engines.registry import ENGINES
 LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
 _OTHER_PINS = ("O2", "A", "O4")
 _LOAD = kinds.Load(4, (3.0, 0.7), arm=(0.05, 1.0), moment=0.2)
-EFFECTS: dict[str, kinds.Effect | None] = {
-    "none": None,
-    "gravity": kinds.Gravity(9.81),
+EFFECTS: dict[str, kinds.Effect | None] = {"none": None}
+EFFECTS |= {
+    key: loads(f"[lengths]\n{LENGTHS_TEXT}\n[effects]\n{kind.example}").effects[0]
+    for key, kind in kinds.list_kinds().items()
+}
+EFFECTS |= {
     "viscous": kinds.Viscous.at(**dict.fromkeys(_OTHER_PINS, 0.01)),
     "viscous at pin B": kinds.Viscous.at(B=0.01),
     "friction": kinds.Friction.at(**dict.fromkeys(_OTHER_PINS, 0.01)),
     "friction at pin B": kinds.Friction.at(B=0.01),
     "pin_friction": kinds.PinFriction.at(**dict.fromkeys(PINS, (0.1, 0.01))),
     "torsion": kinds.Torsion.at(O4=(2.0, 1.9, 0.1)),
-    "springs": kinds.Springs(
-        (
-            kinds.Spring(
-                kinds.Place(1, (0.1, -1.5)),
-                kinds.Place(4, (0.08, 0.0)),
-                200.0,
-                0.05,
-                3.0,
-            ),
-        )
-    ),
-    "flywheel": kinds.Flywheel(0.02),
     "load": _LOAD,
     "load over theta_2": replace(
         _LOAD, table=kinds.Table((0.0, 3.0, math.tau), (0.0, 1.0, 0.0))
     ),
 }
-EFFECTS |= {
-    key: loads(f"[lengths]\n{LENGTHS_TEXT}\n[effects]\n{kind.example}").effects[0]
-    for key, kind in kinds.list_kinds().items()
-    if key not in EFFECTS
-}
-"""Effects by name, each alone on the same linkage. One that is not listed acts as in
-its example of a scene file.
+"""Effects by name, each alone on the same linkage: as in the example of a scene file,
+but for those that act at several pins or beside the closure.
 """
 SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {

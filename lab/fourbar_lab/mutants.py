@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import chain
+from textwrap import dedent
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
@@ -79,35 +80,34 @@ class Mutant(NamedTuple):
 
 def compile_mutants(module: ModuleType) -> Iterator[Mutant]:
     """Compile every mutant of the functions and methods of a module."""
-    tree = ast.parse(inspect.getsource(module))
-    bodies = {"": tree.body}
-    for node in tree.body:
-        if isinstance(node, ast.ClassDef):
-            bodies[f"{node.name}."] = node.body
-    for prefix, body in bodies.items():
-        for definition in body:
-            if isinstance(definition, ast.FunctionDef):
-                qualified = prefix + definition.name
-                yield from _compile_function(module, tree, definition, qualified)
+    for owner in (module, *filter(inspect.isclass, vars(module).values())):
+        for member in vars(owner).values():
+            # the function itself, below its decorators
+            inner = getattr(member, "fget", None) or getattr(member, "__func__", member)
+            function = inspect.unwrap(inner)
+            is_own = getattr(function, "__module__", "") == module.__name__
+            if is_own and isinstance(function, FunctionType):
+                yield from _compile_function(function)
 
 
-def _compile_function(
-    module: ModuleType, tree: ast.Module, definition: ast.FunctionDef, qualified: str
-) -> Iterator[Mutant]:
-    function = _find_function(module, qualified)
+def _compile_function(function: FunctionType) -> Iterator[Mutant]:
+    tree = ast.parse(dedent(inspect.getsource(function)))
+    definition = tree.body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    definition.decorator_list.clear()
+    first = function.__code__.co_firstlineno
     for node in chain.from_iterable(map(ast.walk, definition.body)):
         for field, changed in _list_changes(node):
             original = getattr(node, field)
             before = ast.unparse(node)
             setattr(node, field, changed)
-            compiled = compile(tree, inspect.getfile(module), "exec")
-            line = node.lineno  # type: ignore[attr-defined]
-            name = f"{module.__name__}.{qualified}, line {line}"
+            made: dict[str, Any] = {}
+            exec(compile(tree, __file__, "exec"), function.__globals__, made)
+            line = first - 1 + node.lineno  # type: ignore[attr-defined]
+            name = f"{function.__module__}.{function.__qualname__}, line {line}"
             name += f": {before} -> {ast.unparse(node)}"
             setattr(node, field, original)
-            code = _find_code(compiled, qualified)
-            assert code is not None
-            yield Mutant(name, function, code)
+            yield Mutant(name, function, made[function.__name__].__code__)
 
 
 def _list_changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
@@ -122,28 +122,6 @@ def _list_changes(node: ast.AST) -> Iterator[tuple[str, Any]]:
     for i, operator in enumerate(ops):
         if type(operator) in OTHER:
             yield "ops", [*ops[:i], OTHER[type(operator)](), *ops[i + 1 :]]
-
-
-def _find_code(within: CodeType, qualified: str) -> CodeType | None:
-    """Find the code of a function in that of its module."""
-    for constant in within.co_consts:
-        if isinstance(constant, CodeType):
-            if constant.co_qualname == qualified:
-                return constant
-            if (inner := _find_code(constant, qualified)) is not None:
-                return inner
-    return None
-
-
-def _find_function(module: ModuleType, qualified: str) -> FunctionType:
-    """Find the function itself, below its decorators."""
-    owner, _, name = qualified.rpartition(".")
-    function = inspect.getattr_static(getattr(module, owner) if owner else module, name)
-    function = inspect.unwrap(
-        getattr(function, "fget", None) or getattr(function, "__func__", function)
-    )
-    assert isinstance(function, FunctionType)
-    return function
 
 
 class _HangError(Exception):
