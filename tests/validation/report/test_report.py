@@ -307,6 +307,11 @@ def record_of(name, rows, **parts):
     return Record(name, title=name, rows=rows, **parts)
 
 
+def summary_of_rows(*rows, **parts):
+    """What a run of one scene comes to that has these rows."""
+    return summary_of([record_of("a", [*rows], **parts)])
+
+
 def fail(row, error=1e-3):
     return replace(row, error=error, verdict=FAILS)
 
@@ -408,8 +413,7 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
 ):
     """Missing digits are no missing term, and a number beside no answer no reason."""
     right = RIGHT if "agree" in words else []
-    record = record_of("a", [*wrong, *right], causes={"mine": []})
-    (cause,) = summary_of([record]).causes
+    (cause,) = summary_of_rows(*wrong, *right, causes={"mine": []}).causes
     assert cause.text == words
 
 
@@ -421,7 +425,7 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
         fail(mine(engine="one", quantity="torque_inertia"), 0.2),
     ]
     against = {key: ["one", "two"] for key in ("torque", *PIN_FORCES, "theta_3")}
-    (cause,) = summary_of([record_of("a", rows, against=against)]).causes
+    (cause,) = summary_of_rows(*rows, against=against).causes
     words = "one, two agree with each other, and differ from it in"
     assert (cause.engine, cause.worst.quantity) == (FORMULAS, "torque")
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
@@ -453,22 +457,22 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
     known mistake explains its own; a free motion follows from its forces.
     """
     named = {"named": ["gravity is left out"]}
-    record = record_of("a", [*rows, ALONE], against=against, causes=named)
-    assert {cause.engine for cause in summary_of([record]).causes} == wrong
+    summary = summary_of_rows(*rows, ALONE, against=against, causes=named)
+    assert {cause.engine for cause in summary.causes} == wrong
 
 
 def test_pin_forces_of_which_one_fails_do_not_agree():
     """Its row is fourbar's cause, as two other engines blame fourbar for it."""
-    rows = [fail(mine(quantity=name)) for name in ("F12", "torque")]
-    rows.append(mine(quantity="F14"))
-    summary = summary_of([record_of("a", rows, against={"F12": ["one", "two"]})])
+    wrong = (fail(mine(quantity=name)) for name in ("F12", "torque"))
+    against = {"F12": ["one", "two"]}
+    summary = summary_of_rows(*wrong, mine(quantity="F14"), against=against)
     causes = {cause.engine: cause.text for cause in summary.causes}
     assert causes["mine"] == "torque differs; mistakes are not looked for there"
 
 
 def test_an_engine_that_broke_down_alone_is_named_without_a_quantity():
     words = "mine is wrong: no answer: exit status 3 after 4 s, in 1 scene; a."
-    assert summary_of([record_of("a", [DEAD])]).headline == f"FAILS: {words}"
+    assert summary_of_rows(DEAD).headline == f"FAILS: {words}"
 
 
 @mark.parametrize("row, pictured", [(fail(OF_MINE), 30), (OF_MINE, PICTURED)])
@@ -524,11 +528,11 @@ def test_an_engine_that_drew_nothing_is_not_in_the_caption_of_a_picture():
 )
 def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):
     row = mine(quantity="torque_inertia", verdict=verdict, reason=reason)
-    assert summary_of([record_of("a", [row])]).not_compared == {kind: 1}
+    assert summary_of_rows(row).not_compared == {kind: 1}
 
 
 def test_a_weaker_rule_stands_before_a_verdict_that_holds():
-    summary = summary_of([record_of("a", [OF_MINE])])
+    summary = summary_of_rows(OF_MINE)
     assert summary.good
     summary.weaker = ["mine: factor 1e-14 -> 0.01", "mine: class a -> b"]
     summary.baseline = "last night"

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from itertools import cycle, product
-from math import atan2, degrees, hypot, pi, radians, tau
+from math import atan2, degrees, pi, radians, tau
 
 import matplotlib
 import numpy as np
@@ -126,6 +126,12 @@ def texts_shown(figure):
         if t.get_visible() and t.get_text().strip() and t not in off_axis
     ]
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
+
+
+def words_of(figure):
+    """All texts of a figure, in one line."""
+    shown = " ".join(text.get_text() for text in figure.findobj(Text))
+    return " ".join(shown.split())
 
 
 def clashes(figure):
@@ -291,8 +297,7 @@ def test_bars_are_drawn_to_scale_at_the_requested_position():
         for line in axes.lines
         if line.get_linewidth() == 4.5
     ]
-    lengths = [hypot(*bar) for bar in bars]
-    assert lengths == approx([100.0, 250.0, 220.0])  # mm
+    assert np.hypot(*np.transpose(bars)) == approx([100.0, 250.0, 220.0])  # mm
     assert atan2(*bars[0][::-1]) == approx(1.3)
     assert axes.get_aspect() == 1.0
 
@@ -314,8 +319,7 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     assert np.isnan(x[first + 1]) and np.isnan(y[first + 1])
     assert x[first + 2] == places[1]
     assert panel.get_ylim()[1] < np.nanmax(np.abs(sweep.torque))
-    words = " ".join(text.get_text() for text in figure.findobj(Text))
-    assert "Torque of the drive on bar 4 clipped at" in " ".join(words.split())
+    assert "Torque of the drive on bar 4 clipped at" in words_of(figure)
 
 
 def test_the_largest_of_what_is_clipped_may_be_commanded():
@@ -360,8 +364,7 @@ def test_free_bodies_balance(drive):
 
 @mark.parametrize("name", ["freebody", "bars", "forces"])
 def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
-    caption = draw_figure(RESTING, name).figure.subfigs[0].get_supxlabel()
-    words = " ".join(caption.split())
+    words = words_of(draw_figure(RESTING, name).figure)
     assert "Dry friction at rest is taken as 0" in words
     torque = 1e3 * solve(RESTING).torque[0]
     ends = f"between {torque - 200.0:.3g} mN m and {torque + 200.0:.3g} mN m"
@@ -374,9 +377,9 @@ def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, posit
     linkage = uniform(*PARALLELOGRAM)
     scene = Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
     figure = composed(scene, "bars", position=position)
-    words = " ".join(figure.subfigs[0].get_supxlabel().split())
     moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
-    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
+    words = f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm"
+    assert words in words_of(figure)
     assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
 
 
@@ -385,7 +388,7 @@ def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_mome
     linkage = uniform(*PARALLELOGRAM)
     motion = Motion(Sweep(0.0, tau, 12), 1.0)
     figure = composed(Scene(linkage, motion, effects=(Gravity(),)), "bars")
-    words = " ".join(figure.subfigs[0].get_supxlabel().split())
+    words = words_of(figure)
     moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
     assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
     assert "Pin forces grow without bound" in words
