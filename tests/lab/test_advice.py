@@ -22,7 +22,7 @@ def test_an_unseen_linkage_is_served_and_not_at_three_times_the_cheapest(index):
 
 
 # Wilson: n of n met are at least n/(n + 1.96^2) at 95 %
-@mark.parametrize(("count", "decided"), [(72, FAILED), (73, HOLDS)])
+@mark.parametrize("count, decided", [(72, FAILED), (73, HOLDS)])
 def test_few_cases_cannot_tell_how_often_the_advice_is_met(
     count, decided, tmp_path, monkeypatch
 ):

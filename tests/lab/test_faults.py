@@ -95,7 +95,7 @@ def test_an_injected_fault_fails_the_harness_where_its_entry_says():
 
 
 @mark.parametrize(
-    ("failing", "why"),
+    "failing, why",
     [
         ({"crank": []}, "nothing fails"),
         ({"crank": ["free-body F12: equivalence"]}, "none of torque"),

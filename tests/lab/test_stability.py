@@ -113,9 +113,7 @@ def test_fed_back_as_a_command_of_another_bar_every_output_returns_within_it_too
 
 # ratios: the torque of a bar that hardly turns has a pole; of torque times speed the
 # derivative by theta_2 was 1.05 of what is allowed
-@mark.parametrize(
-    ("family", "samples"), [("random", range(6)), ("ratios", range(2, 3))]
-)
+@mark.parametrize("family, samples", [("random", range(6)), ("ratios", range(2, 3))])
 def test_derivatives_are_within_what_the_inputs_last_digits_do_to_them(family, samples):
     tally = judge_samples(family, samples, derivatives=True)
     assert tally.holds() and not tally.counts["no digit tells"]
@@ -148,7 +146,7 @@ def test_a_share_is_one_that_chance_explains():
 
 
 @mark.parametrize(
-    ("family", "seed", "number"),
+    "family, seed, number",
     [(*drawn, number) for drawn, bad in ONCE_BAD.items() for number in bad],
 )
 def test_samples_that_once_were_bad(family, seed, number):

@@ -51,7 +51,7 @@ def find_failing(rows):
 
 
 @mark.parametrize(
-    ("name", "oracle"),
+    "name, oracle",
     slow_but([asked for asked in ASKED if asked[0] not in SLOW], ASKED),
 )
 def test_the_sample_is_compared_and_holds(name, oracle):
@@ -75,13 +75,13 @@ def hold(scene, oracle):
 
 
 @mark.slow
-@mark.parametrize(("number", "oracle"), share_out(len(SHIPPED), SHIPPED_SHARE))
+@mark.parametrize("number, oracle", share_out(len(SHIPPED), SHIPPED_SHARE))
 def test_shipped_scenes_hold(number, oracle):
     hold(SHIPPED.scene(number), oracle)
 
 
 @mark.slow
-@mark.parametrize(("number", "oracle"), share_out(RANDOM_SCENES, SHARE))
+@mark.parametrize("number, oracle", share_out(RANDOM_SCENES, SHARE))
 def test_random_scenes_hold(number, oracle):
     hold(draw_random_scene(SEED, number, tuple(DrawnType)), oracle)
 

@@ -202,7 +202,7 @@ def test_every_out_has_its_short_name():
 
 
 @mark.parametrize(
-    ("page", "heading", "program"),
+    "page, heading, program",
     [
         ("commands", "| command | result |", group),
         ("checks", "`fourbar-validation` |", harness),
@@ -300,7 +300,7 @@ def test_the_figure_of_the_theory_is_the_one_that_is_drawn():
 
 @mark.slow
 @mark.parametrize(
-    ("name", "options"),
+    "name, options",
     [
         ("crank_rocker.svg", ()),
         ("crank_rocker-linkage.svg", ("--figure", "linkage")),

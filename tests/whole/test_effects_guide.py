@@ -83,7 +83,7 @@ def test_the_example_is_read_written_and_agreed_on(latch):
 
 
 @mark.parametrize(
-    ("engines", "missing", "refusing"),
+    "engines, missing, refusing",
     [
         (EXACT, (), set()),
         (EXACT, ("act_on_engine",), ON_TREES),

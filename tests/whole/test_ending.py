@@ -116,7 +116,7 @@ def test_nothing_outlives_a_command_that_is_ended(what, ended_by, tmp_path):
 
 @mark.posix
 @mark.parametrize(
-    ("program", "status"),
+    "program, status",
     [
         ("bound_processor_time(0.1)\nwhile True: pass", -signal.SIGXCPU),
         # the library starts a program, which outlives the worker or complains

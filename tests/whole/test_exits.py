@@ -121,7 +121,7 @@ ENDS = {
 
 @mark.slow
 @mark.parametrize(
-    ("group", "status"),
+    "group, status",
     [(group, status) for status, groups in ENDS.items() for group in groups],
 )
 def test_every_end_has_its_status(group, status, monkeypatch, capsys):
@@ -162,7 +162,7 @@ VALIDATION = fourbar_validation.cli.status
 
 
 @mark.parametrize(
-    ("figures", "words"),
+    "figures, words",
     [
         (
             [PublishedFigure("2.4 positions", "1 theta3_1", "167.877224", 167.8)],
@@ -226,7 +226,7 @@ PROCESSES = [
 
 @mark.slow
 @mark.parametrize(
-    ("program", "line", "status"),
+    "program, line, status",
     PROCESSES,
     ids=[f"{program} {Path(line).name}" for program, line, _ in PROCESSES],
 )
@@ -294,7 +294,7 @@ def test_a_module_that_the_harness_lacks_is_in_the_extra_of_the_harness(
 
 
 @mark.parametrize(
-    ("header", "row"),
+    "header, row",
     [
         param("theta_2,torque," + "x" * 20_000, "1,2,3", id="a long heading"),
         param(

@@ -158,7 +158,7 @@ def test_what_is_no_table_of_results_is_one_line(text, tmp_path, capsys):
 
 @mark.slow
 @mark.parametrize(
-    ("rows", "reason", "words"),
+    "rows, reason, words",
     [
         (MOST_ROWS_COMPARED + 1, "", f"has {MOST_ROWS_COMPARED + 1} rows"),
         (1000, "a" * (LONGEST_CELL + 1), "is not a table written by `run`"),
@@ -222,7 +222,7 @@ OUTSIDE = ("../a.toml", "/etc/passwd", "../*.toml", "a\0.toml")
 
 
 @mark.parametrize(
-    ("text", "words"),
+    "text, words",
     [
         *((path, "must lie in the folder") for path in OUTSIDE),
         ("c.toml", "c.toml"),

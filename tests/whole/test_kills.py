@@ -109,7 +109,7 @@ def give_lives(tmp_path, monkeypatch):
 
 @mark.slow
 @mark.posix
-@mark.parametrize(("kills", "blamed"), [(1, False), (KILLS_OF_BLAME, True)])
+@mark.parametrize("kills, blamed", [(1, False), (KILLS_OF_BLAME, True)])
 def test_a_worker_killed_once_is_not_held_against_the_engine(
     tmp_path, give_lives, kills, blamed
 ):
@@ -313,7 +313,7 @@ def test_whatever_disturbs_a_run_it_goes_on_and_ends_with_the_same_bytes(
 
 
 @mark.parametrize(
-    ("motion", "key"),
+    "motion, key",
     [
         ('theta_2 = { from = "0 deg", to = "9 deg", steps = %d }', "motion.theta_2"),
         (

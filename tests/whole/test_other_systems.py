@@ -43,7 +43,7 @@ def folder(tmp_path):
 
 
 @mark.parametrize(
-    ("module", "line"),
+    "module, line",
     [
         ("fourbar.cli", "analyze scène.toml --csv -o table.csv"),
         ("fourbar.cli", "analyze scène.toml --json"),

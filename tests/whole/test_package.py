@@ -52,7 +52,7 @@ def libraries(requirements):
 
 
 @mark.parametrize(
-    ("package", "folder"),
+    "package, folder",
     [
         ("fourbar", "fourbar"),
         ("fourbar_validation", "validation/fourbar_validation"),
@@ -133,7 +133,7 @@ def test_every_library_that_fourbar_imports_is_declared():
 
 
 @mark.parametrize(
-    ("library", "extra", "command"),
+    "library, extra, command",
     [
         ("matplotlib", "plot", "plot scene.toml -o a.svg"),
         ("matplotlib", "plot", "animate scene.toml -o a.gif"),

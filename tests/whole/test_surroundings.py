@@ -31,7 +31,7 @@ def locked():
 @mark.slow
 @mark.posix
 @mark.parametrize(
-    ("line", "ends"),
+    "line, ends",
     [
         ("fourbar analyze scene.toml", HOLDS),
         ("fourbar analyze scene.toml --csv -o a.csv", BROKEN),

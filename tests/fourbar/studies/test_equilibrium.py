@@ -418,7 +418,7 @@ def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
 
 
 @mark.parametrize(
-    ("bar", "lengths"), [(2, (0.1, 0.09, 0.04, 0.085)), (4, (0.3, 0.1, 0.25, 0.22))]
+    "bar, lengths", [(2, (0.1, 0.09, 0.04, 0.085)), (4, (0.3, 0.1, 0.25, 0.22))]
 )
 def test_a_sweep_past_two_circuits_has_an_equilibrium_in_each(bar, lengths):
     ground, *others = lengths

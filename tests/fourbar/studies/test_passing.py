@@ -203,7 +203,7 @@ def test_strokes_that_assemble_are_named_where_none_requested_does():
     assert say_range(none) == "this cylinder can have none with motion.side = left"
 
 
-@mark.parametrize(("beyond", "met"), [(4e-6, True), (6e-6, False)])
+@mark.parametrize("beyond, met", [(4e-6, True), (6e-6, False)])
 def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
     """Printed with six digits a limit may lie beyond itself."""
     linkage = crank_rocker().linkage

@@ -328,7 +328,7 @@ def spoil(error):
 
 
 @mark.parametrize(
-    ("torque", "level"),
+    "torque, level",
     [
         (spoil(0.0), "A"),
         (spoil(5e-10), "A"),
@@ -371,7 +371,7 @@ def test_an_answer_at_its_own_motion_is_judged_there():
 
 
 @mark.parametrize(
-    ("text", "status_of_it", "said"),
+    "text, status_of_it, said",
     [
         (
             json.dumps(make_result("newton_128")),
