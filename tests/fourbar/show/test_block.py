@@ -80,8 +80,6 @@ def write(angle):
     return f"{degrees(angle):.4g} deg"
 
 
-LIMITED = (0.3, 0.4, 0.2, 0.25)
-LIMIT = find_angle(0.45, 0.3, 0.4)
 OF_THESIS = limit_positions(thesis().linkage)
 FIRST, SECOND = (write(x) for x in sorted(x.theta_2 % tau for x in OF_THESIS))
 FILES = tomllib.loads("""

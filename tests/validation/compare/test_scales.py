@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from fourbar.effects import Load
 from fourbar.formulas.mobility import limit_positions
@@ -50,7 +51,7 @@ def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_valu
     assert solution.condition[-1] < WELL_CONDITIONED <= solution.condition[:-1].min()
     size = magnitude(solution[quantity])
     expected = np.append(np.full(7, size[:-1].max()), size[-1])
-    np.testing.assert_allclose(scale.size, expected)
+    assert_allclose(scale.size, expected)
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():
@@ -72,7 +73,7 @@ def test_what_the_input_alone_decides_has_no_scale_of_the_other_bars():
         scene = Scene(ROCKER, Motion([LOW + 1e-9], 10.0))
         solution, scale = solve_with_scale(name, scene)
         assert abs(solution.alpha_3[0]) > 1e9
-        np.testing.assert_allclose(scale.size, magnitude(solution[name]))
+        assert_allclose(scale.size, magnitude(solution[name]))
 
 
 def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
@@ -85,12 +86,12 @@ def test_terms_that_cancel_raise_what_is_allowed_by_what_they_exceed_the_rest():
     for left in (1e-1, 1e-2, 1e-4):
         _, scale = solve_with_scale("torque", balance(left))
         moment = 0.5 * 9.80665 * 0.1
-        np.testing.assert_allclose(scale.size, left * moment, rtol=0.02)
+        assert_allclose(scale.size, left * moment, rtol=0.02)
         assert not scale.vanishes.any()
         cancelled[left] = scale.cancellation[0]
         assert 2.0 / left <= cancelled[left] <= 100.0 / left
-        np.testing.assert_allclose(scale.factor, cancelled[left] / 50.0)
-        np.testing.assert_allclose(scale.of_terms, cancelled[left] * scale.size)
+        assert_allclose(scale.factor, cancelled[left] / 50.0)
+        assert_allclose(scale.of_terms, cancelled[left] * scale.size)
     assert cancelled[1e-4] / cancelled[1e-2] == pytest.approx(100.0, rel=0.01)
     _, scale = solve_with_scale("torque", balance(1.0))
     assert np.all(scale.factor == 1.0) and np.all(scale.of_terms == scale.size)
@@ -114,7 +115,7 @@ def test_the_terms_of_an_angular_acceleration_are_those_of_its_own_bar():
         s, scale = solve_with_scale(name, Scene(ROCKER, Motion([0.9], 10.0, 7.0)))
         terms = a * 107.0 + b * s.omega_3**2 + c * s.omega_4**2
         expected = terms / (length * s.condition * np.abs(s[name]))
-        np.testing.assert_allclose(scale.cancellation, expected)
+        assert_allclose(scale.cancellation, expected)
 
 
 def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
@@ -126,12 +127,12 @@ def test_an_answer_has_a_scale_of_its_own_from_its_rates_alone():
     sizes = size_answer(scene, bare)
     assert expected is not None and sizes is not None
     for name in ("torque", "F12"):
-        np.testing.assert_allclose(
+        assert_allclose(
             sizes.scale(name, solution[name]).cancellation,
             expected.scale(name, solution[name]).cancellation,
             rtol=1e-12,
         )
-    np.testing.assert_allclose(sizes.solution.a_G3, solution.a_G3, rtol=1e-12)
+    assert_allclose(sizes.solution.a_G3, solution.a_G3, rtol=1e-12)
     assert size_answer(scene, replace(bare, alpha_4=None)) is None
 
 

@@ -4,6 +4,7 @@ from math import pi, prod, tau
 from pathlib import Path
 
 import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
 from pytest import approx, mark
 
 from fourbar import Motion
@@ -49,9 +50,9 @@ def test_a_spring_is_wound_along_the_assembly_through_change_points(pin, begin):
         )
         torque = ask_at(FreeBody(), scene, command(scene)).quantities["torque"]
         wound = 0.2 + turned > pi
-        np.testing.assert_array_equal(np.isnan(torque), wound)
+        assert_array_equal(np.isnan(torque), wound)
         due = 2.0 * (0.2 + turned)[~wound]
-        np.testing.assert_allclose(torque[~wound], due, rtol=1e-9)
+        assert_allclose(torque[~wound], due, rtol=1e-9)
 
 
 def test_a_spring_is_followed_through_a_gap_with_bars_3_and_4_in_line():
@@ -204,4 +205,4 @@ def test_a_singular_position_costs_no_other():
     matrix = np.array([singular, regular, [[np.nan, 1.0], [1.0, 1.0]]])
     x, residual = solve_system(matrix, np.ones((3, 2, 1)))
     assert np.isnan(x[[0, 2]]).all() and residual == 0.0
-    np.testing.assert_array_equal(x[1, :, 0], [0.5, 0.25])
+    assert_array_equal(x[1, :, 0], [0.5, 0.25])

@@ -9,6 +9,7 @@ from functools import partial
 from math import pi
 
 import numpy as np
+from numpy.testing import assert_array_equal, assert_equal
 from pytest import mark, raises
 
 import fourbar
@@ -158,8 +159,8 @@ def test_an_engine_answers_alike_from_both_ends(name):
     answer = FreeBody().answer(told, command)
     sent = through_text(protocol.answer_to_json(told, command, answer))
     back = protocol.answer_from_json("free-body", commanded, sent)
-    np.testing.assert_equal(back.quantities, direct.quantities)
-    np.testing.assert_equal(back.assembled, direct.assembled)
+    assert_equal(back.quantities, direct.quantities)
+    assert_equal(back.assembled, direct.assembled)
     assert back.at is commanded
 
 
@@ -189,7 +190,7 @@ def test_an_answer_comes_back_with_all_that_it_says():
     back = protocol.answer_from_json("mine", commanded, sent)
     assert all(same(one, two) for one, two in zip(back.at, moved, strict=True))
     for name, value in said.items():
-        np.testing.assert_equal(getattr(back, name), value)
+        assert_equal(getattr(back, name), value)
 
 
 THREE = crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
@@ -204,7 +205,7 @@ def test_what_an_answer_leaves_out_has_defaults():
     answer = read_answer({"answers": {"torque": [1, None, 3], "F12": pairs}})
     assert answer.assembled.tolist() == [True, False, True]
     assert answer.setting == "exact"
-    np.testing.assert_array_equal(answer.at.angle, list_positions(THREE).angle)
+    assert_array_equal(answer.at.angle, list_positions(THREE).angle)
     assert np.isnan(answer.quantities["F12"][1:]).all()
     assert read_answer({"refusal": "no springs here"}).refusal == "no springs here"
     # what the command alone decides is no word on whether the loop closes
