@@ -39,6 +39,7 @@ from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from tests.support.rows import refused
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
+    WEIGHT,
     bare,
     crank_rocker,
     recommand,
@@ -195,7 +196,7 @@ def test_a_bar_that_does_not_turn_takes_no_torque(linkage, branch, drive_bar):
     """
     motion = Motion(np.linspace(0.3, 2.0, 5), 1.0, 2.0, branch)
     rubbing = Friction.at(A=0.1), PinFriction.at(B=(0.1, 0.01))
-    for effects in ((), (Gravity(),), rubbing):
+    for effects in ((), WEIGHT, rubbing):
         solution = solved(Scene(linkage, motion, drive_bar, effects=effects))
         assert solution.status == ["no_torque"] * 5
         rows = solution.to_csv().splitlines()[1:]

@@ -18,7 +18,7 @@ from fourbar_lab.fault_scenes import FAULT_SCENES
 from tests.oracle.oracles import judge_by
 from tests.oracle.variants import SceneFile
 from tests.support.rows import slow_but
-from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.scenes import CYLINDER, WEIGHT, crank_rocker
 
 
 def massive(lengths, masses, *effects, theta_1=0.0, **changes):
@@ -33,7 +33,7 @@ def passing_change_points(lengths, branch):
 
 
 def commanding(motion):
-    return crank_rocker(motion=motion, drive=CYLINDER, effects=(Gravity(),))
+    return crank_rocker(motion=motion, drive=CYLINDER, effects=WEIGHT)
 
 
 def weigh_limited(angle):

@@ -26,6 +26,8 @@ from tests.support.checkout import ROOT
 
 CRANK_ROCKER_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
+WEIGHT = (Gravity(),)
+"""What acts, alone."""
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
 """A cylinder from the ground to the coupler."""
 CYLINDER = LinearDrive(Place(1, (0.25, radians(-160.0))), Place(2, (0.09, 0.17)))
@@ -45,7 +47,7 @@ def crank_rocker(**changes):
         "linkage": linkage,
         "motion": Motion(Sweep(0.1, 0.1 + 2 * pi, 60), 10.0, 5.0),
         "loads": (Load(4, (3.0, 0.7), arm=(0.05, 1.0)), Load(3, moment=-0.2)),
-        "effects": (Gravity(),),
+        "effects": WEIGHT,
         "title": "crank-rocker",
     }
     return Scene(**{**parts, **changes})
@@ -96,7 +98,7 @@ def balance(left, omega_2=0.01):
         Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
     )
     motion = Motion(Sweep(0.1, 0.1 + tau, 36), omega_2)
-    return Scene(linkage, motion, effects=(Gravity(),))
+    return Scene(linkage, motion, effects=WEIGHT)
 
 
 def balanced_lamp(omega_2=None):
@@ -140,7 +142,7 @@ def low_parallelogram():
     return Scene(
         linkage,
         Motion(Sweep(start, stop, 8), 6.0),
-        effects=(Gravity(),),
+        effects=WEIGHT,
         title="parallelogram below its ground",
     )
 

@@ -14,7 +14,6 @@ from pytest import approx, mark, raises
 from fourbar import (
     Friction,
     FromLimit,
-    Gravity,
     InputError,
     LinearDrive,
     Motion,
@@ -32,7 +31,12 @@ from fourbar.quantities import PIN_FORCES
 from fourbar.solution import write_json
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, PARALLELOGRAM, crank_rocker
+from tests.support.scenes import (
+    CRANK_ROCKER_LENGTHS,
+    PARALLELOGRAM,
+    WEIGHT,
+    crank_rocker,
+)
 from tests.support.texts import HELD, LINE_DRIVEN
 
 PAIRS = list(combinations((1, 2, 3, 4), 2))
@@ -52,7 +56,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
 ):
     """At rest forces grow without end only for a line to bar 2, without lever there."""
     link, near = uniform(0.2, 0.48, 0.55, 0.2), FromLimit(1, 1e-10)
-    drive, gravity = ends(start_bar, end_bar), (Gravity(),)
+    drive, gravity = ends(start_bar, end_bar), WEIGHT
     scene = Scene(link, Motion(near, 0.0), effects=gravity, drive=drive)
     s = solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4

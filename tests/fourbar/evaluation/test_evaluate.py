@@ -30,6 +30,7 @@ from fourbar_lab import families, fault_scenes, stability
 from fourbar_lab.tally import TOO_LARGE
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
+from tests.support.scenes import WEIGHT
 
 TURNS = 2000.0 * np.pi
 BARS = 10.0
@@ -112,7 +113,7 @@ SCENES["end of a table"] = Scene(
 SCENES["heavy crank beside its equilibrium"] = Scene(
     FourBar(0.3, Bar(0.1, 1e6), Bar(0.25, 0.5), Bar(0.22, 0.4)),
     Motion(1.5 * np.pi + np.linspace(-1e-3, 1e-3, 101), 1.0),
-    effects=(Gravity(),),
+    effects=WEIGHT,
 )
 for name in (
     "crank-rocker",
@@ -158,7 +159,7 @@ def test_an_error_bar_grows_with_the_angle(angle):
     bits.
     """
     linkage = FourBar(0.3, Bar(0.1, 1.0), Bar(0.25), Bar(0.22), 0.2)
-    scene = Scene(linkage, Motion(angle, 1.0), effects=(Gravity(),))
+    scene = Scene(linkage, Motion(angle, 1.0), effects=WEIGHT)
     slope = abs(9.80665 * 0.05 * np.sin(angle))
     lost = 0.5 * angle * np.finfo(np.longdouble).eps * slope
     assert solve(scene, "error").torque_error[0] >= lost

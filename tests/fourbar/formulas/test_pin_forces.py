@@ -26,7 +26,7 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces
 from fourbar.linkage import PIN_FORCE, PINS
-from tests.support.scenes import TURN, bare, crank_rocker
+from tests.support.scenes import TURN, WEIGHT, bare, crank_rocker
 
 EPS = 2.0**-52
 GROWN = 1e-13
@@ -112,7 +112,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
             if bar > 1:
                 moments[f"loads.{len(loads)}.moment"] = moment
                 loads.append(Load(bar, moment=1.0))
-    one = replace(case, loads=tuple(loads), effects=(Gravity(),))
+    one = replace(case, loads=tuple(loads), effects=WEIGHT)
     given = solve(vary(one, {**moments, "motion.theta_2": angles[:, None]}))
     allowed = GROWN * largest / s.drive_condition
     for name in (*PIN_FORCE.values(), "torque"):

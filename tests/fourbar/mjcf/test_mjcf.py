@@ -14,7 +14,6 @@ from fourbar import (
     Bar,
     FourBar,
     Free,
-    Gravity,
     InputError,
     Load,
     Motion,
@@ -39,7 +38,7 @@ from fourbar_validation.scenes.random import (
 )
 from fourbar_validation.scenes.suites import list_model_files
 from tests.support.rows import read_rows, refused, slow_but
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import WEIGHT, crank_rocker
 
 GAP = 1e-4
 """The promise of the file: the loop closed within this part of the longest bar."""
@@ -178,7 +177,7 @@ def test_a_released_linkage_falls_by_itself(scale):
     ]
     linkage = FourBar(scale * 0.3, *bars, ground_angle=0.2)
     motion = Motion(0.5, 0.0, free=Free(0.5 * sqrt(scale), 10))
-    scene = Scene(linkage, motion, effects=(Gravity(),))
+    scene = Scene(linkage, motion, effects=WEIGHT)
     model, data = opened(scene)
     assert gap(data) < OPEN and model.nu == 0 and model.dof_armature[0] == 0.0
     expected = solve(scene)

@@ -24,7 +24,7 @@ from fourbar import (
 from fourbar.mjcf import write_mjcf
 from fourbar_lab.stability import compute_reference
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import crank_rocker, recommand
+from tests.support.scenes import WEIGHT, crank_rocker, recommand
 
 BARS = 10.0
 """Of an error bar, as `stability` allows."""
@@ -40,7 +40,7 @@ def scene(bar, stroke, side="left", **motion):
     return crank_rocker(
         motion=Motion(stroke=stroke, side=side, **motion),
         drive=LinearDrive(GROUND, ENDS[bar]),
-        effects=(fourbar.Gravity(),),
+        effects=WEIGHT,
     )
 
 

@@ -14,7 +14,6 @@ from fourbar import (
     FourBar,
     Free,
     Friction,
-    Gravity,
     Law,
     LinearDrive,
     Load,
@@ -52,6 +51,7 @@ from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     CYLINDER,
     PARALLELOGRAM,
+    WEIGHT,
     balanced_lamp,
     bare,
     crank_rocker,
@@ -60,8 +60,6 @@ from tests.support.scenes import (
 )
 
 MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
-
-WEIGHT = (Gravity(),)
 
 
 def block(scene, **options):

@@ -7,7 +7,6 @@ import numpy as np
 from pytest import approx, mark
 
 from fourbar import (
-    Gravity,
     Motion,
     Scene,
     Sine,
@@ -26,7 +25,7 @@ from fourbar.show.tables import print_positions
 from fourbar.solution import DEGREES
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import TURN, recommand
+from tests.support.scenes import TURN, WEIGHT, recommand
 
 
 def columns(scene, names):
@@ -149,7 +148,7 @@ def test_ratios_and_centres_are_those_of_the_formulas(speed):
 def test_what_has_no_value_is_a_dash_and_what_is_rounding_zero():
     """Bars 2 and 4 are parallel: I13 lies at infinity, and the weight pulls down."""
     motion = Motion(np.array([1.0, 2.0]), 0.0)
-    s = solve(Scene(uniform(3.0, 1.0, 3.0, 1.0), motion, effects=(Gravity(),)))
+    s = solve(Scene(uniform(3.0, 1.0, 3.0, 1.0), motion, effects=WEIGHT))
     assert np.isnan(derive(s, "I13")).all()
     assert derive(s, "omega_4/omega_2") == approx(1.0)
     assert " - " in print_positions(s, None, DEGREES)

@@ -36,7 +36,7 @@ from fourbar.show.duty import (
     shaking_moment,
 )
 from fourbar.show.motion_curves import describe_motion
-from tests.support.scenes import CYLINDER, crank_rocker
+from tests.support.scenes import CYLINDER, WEIGHT, crank_rocker
 
 ROUND_OFF = 1e-11
 """Some hundred roundings, divided by the smallest sine of this sweep squared."""
@@ -113,7 +113,7 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
     linkage = FourBar(0.3, Bar(0.1, 2.0, 0.0, (0.1, 0.0)), Bar(0.25), Bar(0.22))
     motion = Motion(Sweep(start, stop, 720), speed)
     couple = fourbar.Load(2, moment=-0.7)
-    scene = Scene(linkage, motion, loads=(couple,), effects=(Gravity(),))
+    scene = Scene(linkage, motion, loads=(couple,), effects=WEIGHT)
     duty = motor_duty(solve(scene))
     turned = copysign(1.0, speed) * abs(stop - start)
     first, last = (start, stop) if turned * (stop - start) > 0.0 else (stop, start)

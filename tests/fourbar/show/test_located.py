@@ -8,7 +8,6 @@ from pytest import approx, mark, raises
 
 from fourbar import (
     Free,
-    Gravity,
     InputError,
     Law,
     Motion,
@@ -29,7 +28,7 @@ from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
 from fourbar.studies.passing import join_commands
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import bare, crank_rocker, find_angle
+from tests.support.scenes import WEIGHT, bare, crank_rocker, find_angle
 
 LOCATED = 1e-11
 """rad or s: a place is located to round-off, times the slope of what is asked for."""
@@ -177,7 +176,7 @@ LAW = crank_rocker(
 )
 DROPPED = crank_rocker(
     motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
-    effects=(Gravity(),),
+    effects=WEIGHT,
 )
 
 
@@ -326,7 +325,7 @@ def test_springs_have_their_length_and_pull_as_columns():
 
 def test_a_force_grows_without_bound_beside_a_change_point():
     linkage = uniform(0.3, 0.1, 0.3, 0.1)
-    scene = Scene(linkage, Motion(Sweep(0.0, tau, 12), 1.0), effects=(Gravity(),))
+    scene = Scene(linkage, Motion(Sweep(0.0, tau, 12), 1.0), effects=WEIGHT)
     found = locate(scene, "F14", "5 kN").places
     assert len(found) == 4 and np.abs(np.sin(found)).max() < 0.01
     forces = solve(replace(scene, motion=Motion(found, 1.0))).F14
@@ -340,7 +339,7 @@ def test_what_crowds_beside_a_pole_leaves_the_other_extremes_apart():
     scene = Scene(
         uniform(0.2, 0.2, 0.1, 0.1),
         Motion(Sweep(0.0, tau, 12), 1.0),
-        effects=(Gravity(),),
+        effects=WEIGHT,
     )
     for text in ("1 N", "2 N"):
         found = locate(scene, "F14", text).places

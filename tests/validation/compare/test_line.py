@@ -18,7 +18,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_by
-from tests.support.scenes import crank_rocker, recommand
+from tests.support.scenes import WEIGHT, crank_rocker, recommand
 from tests.validation.engines.test_engines import driven
 
 EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
@@ -65,7 +65,7 @@ JUDGED = {
 @mark.parametrize("what", JUDGED)
 def test_what_is_stated_of_a_line_is_judged(what):
     pair, motion, acting, quantities = JUDGED[what]
-    scene = driven(*pair, 1, **{"effects": (Gravity(),)} | acting)
+    scene = driven(*pair, 1, **{"effects": WEIGHT} | acting)
     rows = judge("", recommand(scene, **motion), [FREE_BODY]).rows
     assert not [row for row in rows if row.failed]
     agreeing = {row.quantity for row in rows if row.verdict == AGREES}
@@ -98,7 +98,7 @@ def test_who_cannot_do_it_refuses_in_one_line_that_names_it():
         1,
         4,
         1,
-        (Gravity(),),
+        WEIGHT,
     )
     outside = GuestClient("outside", Program(("none",)), Hello("outside"))
     for engine, words in (

@@ -16,7 +16,7 @@ from pytest import approx, mark, raises
 from scipy.interpolate import make_interp_spline
 
 import fourbar
-from fourbar import Gravity, Motion, Scene, Sweep, dump, solve
+from fourbar import Motion, Scene, Sweep, dump, solve
 from fourbar.errors import LimitError
 from fourbar.scene import command, command_at
 from fourbar.show.plot.style import apply_style
@@ -39,7 +39,7 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.support.checkout import read
 from tests.support.costs import point
 from tests.support.rows import slow_but
-from tests.support.scenes import CYLINDER, crank_rocker, recommand
+from tests.support.scenes import CYLINDER, WEIGHT, crank_rocker, recommand
 
 
 def turning(omega=10.0, positions=36):
@@ -49,7 +49,7 @@ def turning(omega=10.0, positions=36):
     return Scene(
         CONTENDED_LINKAGE,
         Motion(Sweep(0.0, 2.0 * pi, positions), omega),
-        effects=(Gravity(),),
+        effects=WEIGHT,
     )
 
 
@@ -118,7 +118,7 @@ def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
     sweep = Sweep(radians(200.0), radians(340.0), 20)
     motion = Motion(sweep, 10.0, branch=-1)
-    scene = Scene(linkage, motion, effects=(Gravity(),))
+    scene = Scene(linkage, motion, effects=WEIGHT)
     made = work_precision.CostStudy("past a change point", scene, tmp_path)
     assert tried(scene)(replace(BEST, steps_per_revolution=640)).worst < 1e-4
     assert all(p.errors.worst < 1e-11 for p in made._time_inverse())

@@ -45,7 +45,7 @@ from fourbar_validation.run import causes as search
 from fourbar_validation.run.judge import judge
 from tests.support.guests import PLAIN
 from tests.support.here import list_failed, summary_of
-from tests.support.scenes import crank_rocker, recommand, relink
+from tests.support.scenes import WEIGHT, crank_rocker, recommand, relink
 from tests.support.texts import put
 
 SCENE = crank_rocker(motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
@@ -407,7 +407,7 @@ def test_a_mistake_of_the_inertia_alone_is_said_to_be_there():
 def test_the_force_of_a_drive_takes_part_in_the_balance_that_is_wrong(name):
     """The weight of the coupler is what the balances with and without it differ by."""
     scene = load(CAPABILITIES / f"{name}.toml")
-    scene = replace(scene, effects=(Gravity(),))
+    scene = replace(scene, effects=WEIGHT)
     massless = replace(scene.linkage.coupler, mass=0.0, density=None, inertia=0.0)
     light = relink(scene, coupler=massless)
 
@@ -479,7 +479,7 @@ DONE = {"left out": 0.0, "doubled": 2.0, "reversed": -1.0}
 @mark.slow
 @mark.parametrize("name, word", list(zip(ACTING, cycle(DONE))))
 def test_what_acts_may_be_left_out_doubled_or_reversed(name, word):
-    bare = replace(SCENE, effects=(Gravity(),))
+    bare = replace(SCENE, effects=WEIGHT)
     acting, *left = ACTING[name]
     scene, without = (
         replace(bare, effects=(*bare.effects, *effects)) for effects in ([acting], left)

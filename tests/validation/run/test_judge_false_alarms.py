@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from pytest import importorskip, mark
 
-from fourbar.effects import Gravity, PinFriction
+from fourbar.effects import PinFriction
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Bar, FourBar, uniform
 from fourbar.scene import Scene
@@ -25,7 +25,7 @@ from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.here import EXACT, THROUGH_TIME, list_failed, spoil_formulas
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker, recommand
+from tests.support.scenes import WEIGHT, crank_rocker, recommand
 from tests.support.textbook import Textbook
 
 BY_ITSELF = [engine for engine in EXACT if not engine.library]
@@ -46,7 +46,7 @@ def bars(d, a, b, c, theta_1=0.0, r=None):
 ORDINARY, TINY = (0.2, 0.08, 0.18, 0.15), (20e-6, 8e-6, 18e-6, 15e-6)
 SHORT_INPUT = bars(0.5, 0.002, 0.48, 0.12)
 SCENES = {
-    "short input": Scene(SHORT_INPUT, Motion(POSITIONS, 10.0), effects=(Gravity(),)),
+    "short input": Scene(SHORT_INPUT, Motion(POSITIONS, 10.0), effects=WEIGHT),
     "centre 100 m away": Scene(bars(*ORDINARY, r=100.0), Motion([0.63, 0.94], 10.0)),
     "ground at 1e7 rad": Scene(bars(*ORDINARY, 1e7), Motion([0.63, 1.57], 10.0)),
     "bars of micrometres": Scene(bars(*TINY), Motion(POSITIONS, 10.0)),

@@ -20,7 +20,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report, make_question
-from tests.support.scenes import recommand, relink
+from tests.support.scenes import WEIGHT, recommand, relink
 
 
 def falling(coupler=0.15):
@@ -29,7 +29,7 @@ def falling(coupler=0.15):
     With a coupler of 0.12 m that is a change point.
     """
     linkage = FourBar(0.3, Bar(0.2, 0.2), Bar(coupler, 0.5), Bar(0.22, 0.4))
-    return Scene(linkage, Motion(1.0, 0.0, free=Free(1.0, 100)), effects=(Gravity(),))
+    return Scene(linkage, Motion(1.0, 0.0, free=Free(1.0, 100)), effects=WEIGHT)
 
 
 BEFORE_THE_LINE = 2e-6

@@ -29,7 +29,7 @@ from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import TRANSFORMATIONS, check_transformed
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.rows import read_rows
-from tests.support.scenes import ON_COUPLER, crank_rocker
+from tests.support.scenes import ON_COUPLER, WEIGHT, crank_rocker
 
 EVERYTHING = (
     Gravity(9.81, -1.2),
@@ -151,7 +151,7 @@ def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
         stated = {f"theta_{command}": angles, f"omega_{command}": 1.3}
         motion = Motion(**stated, branch=branch)
         scene = Scene(
-            make_linkage(*map(float, lengths.split())), motion, effects=(Gravity(),)
+            make_linkage(*map(float, lengths.split())), motion, effects=WEIGHT
         )
         try:
             held = list_held(scene)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pytest import approx, mark
 
 import fourbar
-from fourbar import Friction, Gravity, Motion, Point, Sweep, solve
+from fourbar import Friction, Motion, Point, Sweep, solve
 from fourbar.files import loads
 from fourbar.show.columns import choose_columns
 from fourbar.show.derived import derive
@@ -18,12 +18,10 @@ from fourbar.show.plot.curves import CHARTS, draw_chart, list_demand
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.plot.view import make_view
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import WEIGHT, bare, crank_rocker
 from tests.support.texts import COORDINATES
 
-SCENE = crank_rocker(
-    motion=Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=(Gravity(),)
-)
+SCENE = crank_rocker(motion=Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=WEIGHT)
 DEGREES = np.linspace(0.0, 360.0, 121)
 LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""

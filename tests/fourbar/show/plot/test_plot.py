@@ -49,6 +49,7 @@ from tests.support.scenes import (
     CYLINDER,
     PARALLELOGRAM,
     RESTING,
+    WEIGHT,
     crank_rocker,
     recommand,
     thesis,
@@ -81,7 +82,7 @@ COMMANDS = {
 
 
 def commanding(motion):
-    return crank_rocker(motion=motion, drive=CYLINDER, effects=(Gravity(),))
+    return crank_rocker(motion=motion, drive=CYLINDER, effects=WEIGHT)
 
 
 def released(steps=300, duration=0.6, **changes):
@@ -375,7 +376,7 @@ def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
 def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
     """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
     linkage = uniform(*PARALLELOGRAM)
-    scene = Scene(linkage, Motion(angle, 0.0), effects=(Gravity(),))
+    scene = Scene(linkage, Motion(angle, 0.0), effects=WEIGHT)
     figure = composed(scene, "bars", position=position)
     moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
     words = f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm"
@@ -387,7 +388,7 @@ def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_mome
     """That of bar 4 has no pin forces: m g c/8 at 0 deg."""
     linkage = uniform(*PARALLELOGRAM)
     motion = Motion(Sweep(0.0, tau, 12), 1.0)
-    figure = composed(Scene(linkage, motion, effects=(Gravity(),)), "bars")
+    figure = composed(Scene(linkage, motion, effects=WEIGHT), "bars")
     words = words_of(figure)
     moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
     assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
