@@ -38,7 +38,7 @@ from fourbar.linkage import MOVING_BARS, PINS
 from fourbar.quantities import JAMMED, OK, STAGE_OF, STAGES
 from tests.support.rows import refused
 from tests.support.scenes import (
-    CRANK_ROCKER_LENGTHS,
+    UNIFORM,
     WEIGHT,
     bare,
     crank_rocker,
@@ -186,7 +186,6 @@ def test_where_the_loop_does_not_close_only_what_is_commanded_has_a_value(kind):
 
 PARALLELOGRAM = uniform(1.0, 0.5, 1.0, 0.5)
 KITE = uniform(1.0, 0.5, 0.5, 1.0)
-CRANK_ROCKER = uniform(*CRANK_ROCKER_LENGTHS)
 
 
 @mark.parametrize("linkage, branch, drive_bar", [(PARALLELOGRAM, 1, 3), (KITE, -1, 4)])
@@ -253,7 +252,7 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
     """
     friction = PinFriction.at(A=(0.9, 0.2))
     motion = Motion(np.linspace(0.1, 6.2, 60), 0.0)
-    solution = solved(Scene(CRANK_ROCKER, motion, 4, effects=(Gravity(), friction)))
+    solution = solved(Scene(UNIFORM, motion, 4, effects=(Gravity(), friction)))
     jammed = solution.status_code == JAMMED
     assert jammed.any() and np.isfinite(solution.torque).all()
     lost = np.isnan(solution.torque_low) | np.isnan(solution.torque_high)

@@ -26,6 +26,8 @@ from tests.support.checkout import ROOT
 
 CRANK_ROCKER_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
+UNIFORM = uniform(*CRANK_ROCKER_LENGTHS)
+UNIFORM_PARALLELOGRAM = uniform(*PARALLELOGRAM)
 WEIGHT = (Gravity(),)
 """What acts, alone."""
 ON_COUPLER = LinearDrive(Place(1, (0.25, -2.8)), Place(3, (0.09, 0.17)))
@@ -81,6 +83,9 @@ def bare(d, a, b, c, theta_1=0.0):
     return FourBar(d, *(Bar(length) for length in (a, b, c)), ground_angle=theta_1)
 
 
+MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
+
+
 def draw_linkage(rng, integers=False):
     """Draw lengths that can close, of 0.1 to 1 or of whole numbers, and theta_1."""
     while True:
@@ -97,8 +102,7 @@ def balance(left, omega_2=0.01):
         Bar(0.25, 0.5, 0.004, (0.0, 0.0)),
         Bar(0.22, 0.4, 0.002, (0.0, 0.0)),
     )
-    motion = Motion(Sweep(0.1, 0.1 + tau, 36), omega_2)
-    return Scene(linkage, motion, effects=WEIGHT)
+    return Scene(linkage, Motion(Sweep(0.1, 0.1 + tau, 36), omega_2), effects=WEIGHT)
 
 
 def balanced_lamp(omega_2=None):
@@ -137,7 +141,7 @@ def low_parallelogram():
     antiparallelogram.
     """
     ground_angle = 0.2
-    linkage = replace(uniform(0.3, 0.1, 0.3, 0.1), ground_angle=ground_angle)
+    linkage = replace(UNIFORM_PARALLELOGRAM, ground_angle=ground_angle)
     start, stop = np.radians([200.0, 340.0]) + ground_angle
     return Scene(
         linkage,

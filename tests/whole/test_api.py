@@ -341,5 +341,4 @@ def test_the_sign_of_the_branch_is_that_of_the_pose():
     pin = {"A": np.empty((2, 2))}
     whole = solve(kite)
     assert whole.branch.tolist() == np.sign(whole.sin_mu).tolist() == [1, -1]
-    at = fourbar.command(kite)
-    assert solve(kite, at=at, out=pin).branch.tolist() == [1, -1]
+    assert solve(kite, at=fourbar.command(kite), out=pin).branch.tolist() == [1, -1]

@@ -17,7 +17,6 @@ from fourbar import (
     Spring,
     Table,
     solve,
-    uniform,
 )
 from fourbar.effects.pin_friction import (
     MANY,
@@ -30,7 +29,7 @@ from fourbar.errors import InputError, LimitError
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.scene import Command, Scene
 from tests.support.rows import read_rows
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, crank_rocker, find_angle
+from tests.support.scenes import CRANK_ROCKER_LENGTHS, UNIFORM, crank_rocker, find_angle
 
 LAST_DIGITS = 64 * 2.0**-52
 """The roundings of one evaluation."""
@@ -130,7 +129,7 @@ def test_breaks_change_their_sign_where_forces_jump_or_bend():
         find_angle(c, d, b - a) + pi,
     ]
     friction = Friction.at(O4=0.1)
-    scene = Scene(uniform(*CRANK_ROCKER_LENGTHS), loads=(load,), effects=(friction,))
+    scene = Scene(UNIFORM, loads=(load,), effects=(friction,))
     angles = np.linspace(0.0, 2.0 * tau, 1009)
     branch = np.ones(len(angles), dtype=np.int8)
     for speed in (3.0, -3.0):

@@ -25,6 +25,7 @@ from fourbar.linkage import PINS
 from fourbar.quantities import CHANGE_POINT, WOUND
 from fourbar_validation.run.judge import judge
 from tests.support.rows import read_rows, slow_but
+from tests.support.scenes import UNIFORM
 
 EDGE = 1e-9
 """rad; nearer than this to half a turn rounding may put a position on either side."""
@@ -35,7 +36,7 @@ def test_a_spring_whose_ends_meet_once_loses_that_position_alone():
     motion = Motion([0.3, 0.5, 0.5 + 1e-9, 0.7], 8.0)
     for others in ((), (PinFriction.at(O2=(0.2, 0.01)),)):
         effects = (*others, Springs((spring,)))
-        solution = solve(Scene(uniform(0.3, 0.1, 0.25, 0.22), motion, effects=effects))
+        solution = solve(Scene(UNIFORM, motion, effects=effects))
         assert solution.status == ["ok", "no_direction", "ok", "ok"]
         assert list(np.isnan(solution.torque)) == [False, True, False, False]
 

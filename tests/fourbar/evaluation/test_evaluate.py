@@ -22,7 +22,6 @@ from fourbar import (
     command,
     limit_positions,
     solve,
-    uniform,
 )
 from fourbar.formulas import longer
 from fourbar.quantities import PIN_FORCES
@@ -30,7 +29,7 @@ from fourbar_lab import families, fault_scenes, stability
 from fourbar_lab.tally import TOO_LARGE
 from fourbar_validation.compare.tolerance import magnitude
 from fourbar_validation.engines.exact import BallArithmetic
-from tests.support.scenes import WEIGHT
+from tests.support.scenes import UNIFORM, WEIGHT
 
 TURNS = 2000.0 * np.pi
 BARS = 10.0
@@ -105,7 +104,7 @@ SCENES |= {
 }
 # the slope of the forces would be taken beyond the table
 SCENES["end of a table"] = Scene(
-    uniform(0.3, 0.1, 0.25, 0.22),
+    UNIFORM,
     Motion([0.7, 1.0], 3.0),
     loads=(Load(4, moment=1.0, table=Table((0.5, 1.0), (1.0, 2.0))),),
 )

@@ -14,6 +14,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.scene.motion import COMMAND_NAMES, Law, Motion, Rise, Sine
 from tests.support.block import read_block
 from tests.support.rows import read_rows, refused
+from tests.support.scenes import UNIFORM
 
 EXACT = 1e-13
 """Relative to the largest term: some ten roundings of a polynomial of degree 5."""
@@ -188,7 +189,7 @@ def test_a_table_of_angles_says_what_its_ends_assume(ends, other):
     times, angles = (0.0, 0.2, 0.5, 0.7, 1.0), (0.0, 0.5, 1.5, 1.9, 2.0)
     law, changed = (Law(times, angles, ends=name) for name in (ends, other))
     at_ends = np.array([*np.linspace(0.0, 0.2, 2001), *np.linspace(0.7, 1.0, 2001)])
-    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law), effects=(Gravity(),))
+    scene = Scene(UNIFORM, Motion(law=law), effects=(Gravity(),))
     printed = read_block(solve(scene, "error"))
     assert f'ends = "{ends}"' in printed and f'"{other}" changes' in printed
     rates = (one.at(at_ends) for one in (law, changed))
@@ -202,5 +203,4 @@ def test_a_table_that_leaves_no_choice_says_nothing_of_its_ends():
     times, angles = (0.0, 0.3, 0.7, 1.0), (0.0, 2.0, 4.0, 2.0 * pi)
     rates = Law((0.0, 1.0), (0.0, 1.0), omega_2=(0.0, 0.0))
     for law in (Law(times, angles, ends="periodic"), rates):
-        scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(law=law))
-        assert "ends" not in read_block(solve(scene))
+        assert "ends" not in read_block(solve(Scene(UNIFORM, Motion(law=law))))

@@ -23,7 +23,7 @@ from fourbar.show.acting import list_drawn_notes, list_spring_notes
 from fourbar.solution import DEGREES
 from tests.support.block import read_block
 from tests.support.rows import read_rows
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare
+from tests.support.scenes import MASSLESS
 
 HATCH = """
 [lengths]
@@ -224,7 +224,6 @@ def test_a_sweep_from_a_drawing_that_goes_the_long_way_is_told(start, stop, told
     assert told in note and bool(told) == note.startswith("theta_2 goes by 340 deg")
 
 
-MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
 ENDS = Place(1, (0.3, 0.0)), Place(2, (0.1, 0.0))
 
 

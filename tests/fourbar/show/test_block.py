@@ -50,6 +50,7 @@ from tests.support.rows import slow_but
 from tests.support.scenes import (
     CRANK_ROCKER_LENGTHS,
     CYLINDER,
+    MASSLESS,
     PARALLELOGRAM,
     WEIGHT,
     balanced_lamp,
@@ -58,8 +59,6 @@ from tests.support.scenes import (
     find_angle,
     thesis,
 )
-
-MASSLESS = bare(*CRANK_ROCKER_LENGTHS)
 
 
 def block(scene, **options):

@@ -28,7 +28,13 @@ from fourbar.show.columns import choose_columns
 from fourbar.show.located import list_positions, locate
 from fourbar.studies.passing import join_commands
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import WEIGHT, bare, crank_rocker, find_angle
+from tests.support.scenes import (
+    UNIFORM_PARALLELOGRAM,
+    WEIGHT,
+    bare,
+    crank_rocker,
+    find_angle,
+)
 
 LOCATED = 1e-11
 """rad or s: a place is located to round-off, times the slope of what is asked for."""
@@ -324,8 +330,9 @@ def test_springs_have_their_length_and_pull_as_columns():
 
 
 def test_a_force_grows_without_bound_beside_a_change_point():
-    linkage = uniform(0.3, 0.1, 0.3, 0.1)
-    scene = Scene(linkage, Motion(Sweep(0.0, tau, 12), 1.0), effects=WEIGHT)
+    scene = Scene(
+        UNIFORM_PARALLELOGRAM, Motion(Sweep(0.0, tau, 12), 1.0), effects=WEIGHT
+    )
     found = locate(scene, "F14", "5 kN").places
     assert len(found) == 4 and np.abs(np.sin(found)).max() < 0.01
     forces = solve(replace(scene, motion=Motion(found, 1.0))).F14

@@ -22,7 +22,6 @@ from fourbar import (
     Scene,
     Sweep,
     solve,
-    uniform,
 )
 from fourbar.files import loads
 from fourbar.scene import command_at
@@ -31,7 +30,11 @@ from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import COMMON, units
 from fourbar.studies import course
 from tests.support.rows import slow_but
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, crank_rocker
+from tests.support.scenes import (
+    UNIFORM,
+    UNIFORM_PARALLELOGRAM,
+    crank_rocker,
+)
 from tests.support.texts import PLIERS
 
 SIX_DIGITS = 6e-6
@@ -65,7 +68,7 @@ def test_what_a_scene_has_not_is_left_out(motion, rates):
 
 
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_dash():
-    lift = Scene(uniform(0.3, 0.1, 0.3, 0.1), Motion(np.pi / 2.0, 1.0))
+    lift = Scene(UNIFORM_PARALLELOGRAM, Motion(np.pi / 2.0, 1.0))
     text = "\n".join(
         line
         for sheet in [PositionSheet(solve(lift), COMMON)]
@@ -182,7 +185,7 @@ def test_a_motion_that_begins_ends_or_stands_still_has_no_limit(motion):
 
 def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     """At the limit of bar 4 its speed is zero; a whole turn later the angle is 2 pi."""
-    scene = Scene(uniform(*CRANK_ROCKER_LENGTHS), Motion(None, 10.0))
+    scene = Scene(UNIFORM, Motion(None, 10.0))
     at_limit = locate(scene, "theta_4", "max")
     rows = PositionSheet(solve(scene, at=at_limit), units("N m")).write_bars()
     assert abs(solve(scene, at=at_limit).omega_4[0]) > 0.0

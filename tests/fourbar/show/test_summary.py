@@ -34,7 +34,7 @@ from fourbar.show.summary import Facts
 from fourbar.studies.internal_forces import largest_bending
 from fourbar_validation.places import MODELS
 from tests.support.rows import slow_but
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare, crank_rocker
+from tests.support.scenes import MASSLESS, bare, crank_rocker
 
 NODES, WEIGHTS = leggauss(600)
 """Positions of each smooth piece of a motion, closer to each other at its ends."""
@@ -222,7 +222,7 @@ def test_forces_whose_squares_overflow_have_the_peaks_and_means_of_smaller_ones(
     def list_numbers(force):
         motion = Motion(Sweep(0.1, 0.1 + tau, 12), 10.0)
         load = Load(3, (force, 0.4), from_pin=(0.05, 0.0))
-        facts = Facts(solve(Scene(bare(*CRANK_ROCKER_LENGTHS), motion, loads=(load,))))
+        facts = Facts(solve(Scene(MASSLESS, motion, loads=(load,))))
         duty = facts.duty
         torques = duty.peak_torque, duty.rms_torque, duty.energy_in
         of_pins = map(facts.motion.find_rms, PIN_FORCE.values())
@@ -351,11 +351,10 @@ def test_three_stretches_of_a_turn_are_two_swings_that_make_a_turn():
 
 def test_angles_have_the_turn_of_the_first_position():
     """Bar 4 passes 180 deg between that and the first node of the curves."""
-    bars = bare(*CRANK_ROCKER_LENGTHS)
-    (at_start,) = solve(Scene(bars, Motion(1.5))).theta_4
+    (at_start,) = solve(Scene(MASSLESS, Motion(1.5))).theta_4
     turned = pi - 1e-3 - at_start
     sweep = Sweep(1.5 + turned, 2.5 + turned, 8)
-    scene = Scene(replace(bars, ground_angle=turned), Motion(sweep))
+    scene = Scene(replace(MASSLESS, ground_angle=turned), Motion(sweep))
     ((low, _),) = Facts(solve(scene)).angles[4]
     assert low.value == approx(pi - 1e-3)
 

@@ -40,7 +40,7 @@ from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar_validation.places import MODELS
 from tests.support.rows import slow_but
 from tests.support.scenes import (
-    CRANK_ROCKER_LENGTHS,
+    MASSLESS,
     balanced_lamp,
     bare,
     recommand,
@@ -91,7 +91,7 @@ TOP = pi / 2 + 0.1
 SPRING = Springs((Spring(Place(1, (0.3, 1.0)), Place(2, (0.1, 0.0)), 100.0),))
 
 
-WITHOUT_MASS = replace(crank_as_pendulum(SPRING), linkage=bare(*CRANK_ROCKER_LENGTHS))
+WITHOUT_MASS = replace(crank_as_pendulum(SPRING), linkage=MASSLESS)
 
 
 HANGS = ("stable", AT_REST, -FALLS, J)

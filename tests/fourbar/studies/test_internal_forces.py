@@ -23,15 +23,12 @@ from fourbar import (
     solve,
 )
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import CRANK_ROCKER_LENGTHS, bare, crank_rocker
+from tests.support.scenes import MASSLESS, crank_rocker
 
 ROUNDED = 1e-12
 """Relative to the sum of the terms: some tens of roundings and a division by sin mu,
 which is above 0.6 here.
 """
-
-
-BARE = bare(*CRANK_ROCKER_LENGTHS)
 
 
 AT = Motion(1.0, 0.0)
@@ -62,8 +59,8 @@ def test_a_couple_bends_its_bar_from_its_place_on(bar, load, foot):
     load = Load(bar, moment=3.0, **json.loads(load))
     point = Point("P", 4, from_pin=(0.05, 0.0))
     x = np.array([0.01, 0.06, 0.12, 0.2])
-    internal = solved(Scene(BARE, AT, loads=(load,), points=(point,)), bar, x)
-    length = BARE.bar(bar).length
+    internal = solved(Scene(MASSLESS, AT, loads=(load,), points=(point,)), bar, x)
+    length = MASSLESS.bar(bar).length
     assert_allclose(internal.M[0], 3.0 * (x / length - (x > foot)), atol=3.0 * ROUNDED)
     largest = 3.0 * max(foot, length - foot) / length
     assert abs(internal.largest.moment[0]) == approx(largest, rel=ROUNDED)
@@ -76,7 +73,7 @@ def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight(centre, eighths):
 
     w is its weight per metre across the bar.
     """
-    linkage = replace(BARE, coupler=Bar(0.25, 2.0, centre=centre))
+    linkage = replace(MASSLESS, coupler=Bar(0.25, 2.0, centre=centre))
     scene = Scene(linkage, AT, effects=(Gravity(9.81),))
     internal, theta = solved(scene, 3), solve(scene).theta_3[0]
     weight = 2.0 * 9.81 * math.cos(theta)
@@ -91,7 +88,7 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass_and_bent_by_its_inertia():
     O2, less what a flywheel takes, is the moment there, m L^2 alpha/3, and V falls to
     nothing at A.
     """
-    linkage = replace(BARE, input=Bar(0.1, 3.0))
+    linkage = replace(MASSLESS, input=Bar(0.1, 3.0))
     turning = Scene(linkage, Motion(1.0, 20.0))
     x = np.linspace(0.0, 0.099, 5)
     internal = solved(turning, 2, x)
@@ -129,7 +126,7 @@ def test_beyond_its_second_pin_a_uniform_bar_bends_as_a_cantilever():
 
     Beyond, P (a - x) of the load alone, and nothing beyond the load.
     """
-    linkage = replace(BARE, output=Bar(0.22, 0.4))
+    linkage = replace(MASSLESS, output=Bar(0.22, 0.4))
     load = Load(4, (8.0, math.radians(-90.0)), from_pin=(0.3, 0.0), frame="bar")
     motion = Motion(1.1, 12.0, 30.0)
     scene = Scene(linkage, motion, loads=(load,), effects=(Gravity(9.81),))

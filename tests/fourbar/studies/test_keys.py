@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from fourbar import Gravity, Tolerance, Viscous, save, solve, tolerances, uniform, vary
+from fourbar import Gravity, Tolerance, Viscous, save, solve, tolerances, vary
 from fourbar.files import dump, loads
 from fourbar.studies.keys import list_entries
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import UNIFORM, crank_rocker
 from tests.support.texts import LENGTHS
 
 DRAWING = """\
@@ -140,7 +140,7 @@ def test_a_tolerance_of_such_a_key_gets_that_line():
 def test_tolerances_of_pins_are_written_and_shown(show):
     scene = replace(DRAWN, tolerances=(Tolerance("pins.O2.0", "0.05 mm"),))
     assert loads(dump(scene)) == scene
-    redrawn = replace(scene, linkage=uniform(0.3, 0.1, 0.25, 0.22))
+    redrawn = replace(scene, linkage=UNIFORM)
     with refused("no number of the scene has this key"):
         dump(redrawn)  # its file states lengths
     save(scene, "drawn.toml")

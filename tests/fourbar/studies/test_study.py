@@ -24,12 +24,12 @@ from fourbar import (
     Torsion,
     command,
     solve,
-    uniform,
     vary,
 )
 from fourbar.files import loads
 from fourbar.studies.keys import list_entries, read_place, replace_place
 from tests.support.rows import read_rows, refused
+from tests.support.scenes import UNIFORM
 
 M, ANGLES = 9, np.array([0.2, 0.9, 2.5, 3.9, 5.6])
 ACTED_ON = loads("""
@@ -168,7 +168,7 @@ def test_listed_angles_keep_their_rates_in_every_member():
 
 
 def test_a_bad_member_has_a_status_and_disturbs_no_other():
-    plain = Scene(uniform(0.3, 0.1, 0.25, 0.22), Motion(Sweep(0.0, 6.0, 3), 5.0))
+    plain = Scene(UNIFORM, Motion(Sweep(0.0, 6.0, 3), 5.0))
     values = {
         "lengths.input": [0.1, -0.1, 0.0, np.nan, 3.0, 0.1],
         "bars.coupler.mass": [1.0, 1.0, 1.0, 1.0, 1.0, -1.0],
@@ -266,8 +266,7 @@ def test_a_torsion_spring_is_followed_from_where_each_member_begins():
 
 
 def test_a_position_that_is_listed_twice_keeps_both_rates_in_every_member():
-    motion = Motion([0.1, 0.5, 0.1], [1.0, 2.0, -1.0], [3.0, 4.0, 5.0])
-    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
+    scene = Scene(UNIFORM, Motion([0.1, 0.5, 0.1], [1.0, 2.0, -1.0], [3.0, 4.0, 5.0]))
     members = solve(vary(scene, {"lengths.input": [0.1, 0.1]}))
     for name in ("omega_4", "alpha_4", "torque"):
         alone = getattr(solve(scene), name)

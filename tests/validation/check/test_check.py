@@ -29,7 +29,12 @@ from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows, refused, slow_but
-from tests.support.scenes import bare, recommand, relink
+from tests.support.scenes import (
+    MASSLESS,
+    UNIFORM_PARALLELOGRAM,
+    recommand,
+    relink,
+)
 
 SCENES = {
     name: fourbar.load(MODELS / f"{name}.toml")
@@ -663,7 +668,7 @@ def test_what_is_zero_by_all_its_terms_is_judged_in_its_own_unit(torque, code, c
 
     Half a printed digit over a scale of 0 once excused any number.
     """
-    scene = Scene(bare(0.3, 0.1, 0.25, 0.22), Motion(1.0, 2.0))
+    scene = Scene(MASSLESS, Motion(1.0, 2.0))
     assert check(scene, f"theta_2,torque\n1.0,{torque}\n")[0] == code
 
 
@@ -920,7 +925,7 @@ def test_two_numbers_beyond_a_tolerance_are_too_few_for_a_fit(judged):
 
 def test_a_law_and_a_changing_branch_are_judged_at_the_positions_of_the_scene(read):
     scene = Scene(
-        fourbar.uniform(0.3, 0.1, 0.3, 0.1),
+        UNIFORM_PARALLELOGRAM,
         Motion(Sweep(0.5, 4.0, 21), 2.0),
     )
     solution = solve(scene)

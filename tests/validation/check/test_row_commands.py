@@ -9,14 +9,21 @@ from math import pi, radians
 import numpy as np
 from pytest import fixture, mark, raises
 
-from fourbar import Motion, Rise, Sine, Sweep, solve, uniform
+from fourbar import Motion, Rise, Sine, Sweep, solve
 from fourbar.errors import FAILED, HOLDS, InputError
 from fourbar.scene import Command, Scene
 from fourbar_validation.check.check import Judgement
 from fourbar_validation.check.judge_table import Judge
 from fourbar_validation.check.row_commands import find_row_commands
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import CYLINDER, WEIGHT, crank_rocker, meet_circles, recommand
+from tests.support.scenes import (
+    CYLINDER,
+    UNIFORM_PARALLELOGRAM,
+    WEIGHT,
+    crank_rocker,
+    meet_circles,
+    recommand,
+)
 
 SAME_PLACE = 1e-9
 """rad: a position by two circles and one by the formulas, 0.1 rad off a limit."""
@@ -174,9 +181,9 @@ def test_an_angle_that_is_passed_twice_needs_the_commanded_one(judged):
 
 
 def test_a_parallelogram_is_found_on_both_halves_of_its_turn(judged):
-    linkage = uniform(0.3, 0.1, 0.3, 0.1)
-    motion = Motion(Sweep(0.1, 4.1, 20), 5.0)
-    scene = Scene(linkage, motion, effects=WEIGHT)
+    scene = Scene(
+        UNIFORM_PARALLELOGRAM, Motion(Sweep(0.1, 4.1, 20), 5.0), effects=WEIGHT
+    )
     angles = np.radians([20.0, 100.0, 200.0, 250.0, 340.0])
     expected = (0.1 + 0.3) * 9.81 * 0.1 * np.cos(angles)
     assert judged(scene, "theta_4", angles, expected, "{:.0f}").status == HOLDS

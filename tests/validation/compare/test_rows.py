@@ -203,8 +203,7 @@ def test_a_run_in_which_nothing_was_compared_says_so_everywhere_and_ends_with_1(
     """A simulation needs more than one position."""
     judge_here(monkeypatch)
     file, out = tmp_path / "scene.toml", tmp_path / "out"
-    linkage = bare(4.0, 1.0, 3.0, 3.0)
-    save(Scene(linkage, Motion(math.radians(10.0), 1.0)), file)
+    save(Scene(bare(4.0, 1.0, 3.0, 3.0), Motion(math.radians(10.0), 1.0)), file)
     line = ["run", str(file), "--no-pictures", "--out", str(out), "--engines"]
     assert status([*line, "mujoco-simulated"]) == FAILED
     sentence = "Nothing was compared on 1 scene: 9 of the formulas' own identities hold"

@@ -50,8 +50,7 @@ def test_the_scale_is_the_greatest_well_conditioned_value_and_elsewhere_the_valu
     solution, scale = solve_with_scale(quantity, scene)
     assert solution.condition[-1] < WELL_CONDITIONED <= solution.condition[:-1].min()
     size = magnitude(solution[quantity])
-    expected = np.append(np.full(7, size[:-1].max()), size[-1])
-    assert_allclose(scale.size, expected)
+    assert_allclose(scale.size, np.append(np.full(7, size[:-1].max()), size[-1]))
 
 
 def test_where_everything_cancels_the_scale_is_that_of_the_forces_that_cancel():

@@ -39,7 +39,13 @@ from fourbar_validation.scenes.suites import MODELS
 from tests.support.checkout import read
 from tests.support.costs import point
 from tests.support.rows import slow_but
-from tests.support.scenes import CYLINDER, WEIGHT, crank_rocker, recommand
+from tests.support.scenes import (
+    CYLINDER,
+    UNIFORM_PARALLELOGRAM,
+    WEIGHT,
+    crank_rocker,
+    recommand,
+)
 
 
 def turning(omega=10.0, positions=36):
@@ -115,10 +121,8 @@ def test_the_defaults_stay_at_their_floor_at_every_timestep(tmp_path):
 @mark.slow
 def test_a_study_past_a_change_point_stays_on_the_assembly(tmp_path):
     """The sign of an antiparallelogram's sine changes there; its assembly does not."""
-    linkage = fourbar.uniform(0.3, 0.1, 0.3, 0.1)
-    sweep = Sweep(radians(200.0), radians(340.0), 20)
-    motion = Motion(sweep, 10.0, branch=-1)
-    scene = Scene(linkage, motion, effects=WEIGHT)
+    motion = Motion(Sweep(radians(200.0), radians(340.0), 20), 10.0, branch=-1)
+    scene = Scene(UNIFORM_PARALLELOGRAM, motion, effects=WEIGHT)
     made = work_precision.CostStudy("past a change point", scene, tmp_path)
     assert tried(scene)(replace(BEST, steps_per_revolution=640)).worst < 1e-4
     assert all(p.errors.worst < 1e-11 for p in made._time_inverse())

@@ -11,7 +11,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar_validation.run.judge import judge
 from tests.support.robots import forward
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import UNIFORM, crank_rocker
 from tests.validation.engines.test_applied_effects import ACTING
 
 BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
@@ -66,10 +66,7 @@ def test_each_effect_adds_what_it_needs_and_no_more(
     ],
 )
 def test_what_does_not_move_through_time_is_not_simulated(motion, note):
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.1, 0.25, 0.22), fourbar.Motion(*motion)
-    )
-    record = judge("scene", scene)
+    record = judge("scene", fourbar.Scene(UNIFORM, fourbar.Motion(*motion)))
     assert note in record.left_out
     exact = {"formulas", "free-body", "mujoco-inverse", "pinocchio-inverse"}
     assert {row.engine for row in record.rows} == exact

@@ -37,7 +37,14 @@ from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_by
 from tests.support.rows import slow_but
-from tests.support.scenes import crank_rocker, find_angle, recommand, relink, thesis
+from tests.support.scenes import (
+    UNIFORM,
+    crank_rocker,
+    find_angle,
+    recommand,
+    relink,
+    thesis,
+)
 from tests.validation.engines.test_applied_effects import ACTING, scene
 
 ENGINE = {
@@ -483,11 +490,11 @@ def test_a_steady_input_keeps_its_digits_beside_bars_that_are_fast(name, index):
 def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
     drive, mu, r, theta_2
 ):
-    link, motion = uniform(0.3, 0.1, 0.25, 0.22), Motion(np.array([theta_2]), 3.0, 2.0)
+    motion = Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
         friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
         case = Scene(
-            link,
+            UNIFORM,
             motion,
             drive,
             (),

@@ -32,8 +32,7 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     scale = Fraction("0.0254") if unit == INCH else Fraction(1, 1000)
     exact = [Fraction(text) * scale for text in stated]
     assert find_stated_lengths(linkage.lengths) == exact
-    scene = Scene(linkage, Motion([0.0, math.pi], 1.0))
-    command = fourbar.command(scene)
+    command = fourbar.command(Scene(linkage, Motion([0.0, math.pi], 1.0)))
     assert np.nanmin(np.abs(compute_exact_sines(linkage, command))) < 1e-15
     d, *others = linkage.lengths
     longer = uniform(d, *(x * (1 + 1e-9) for x in others))

@@ -51,8 +51,7 @@ def test_a_spring_is_wound_along_the_assembly_through_change_points(pin, begin):
         torque = ask_at(FreeBody(), scene, command(scene)).quantities["torque"]
         wound = 0.2 + turned > pi
         assert_array_equal(np.isnan(torque), wound)
-        due = 2.0 * (0.2 + turned)[~wound]
-        assert_allclose(torque[~wound], due, rtol=1e-9)
+        assert_allclose(torque[~wound], 2.0 * (0.2 + turned)[~wound], rtol=1e-9)
 
 
 def test_a_spring_is_followed_through_a_gap_with_bars_3_and_4_in_line():
@@ -90,8 +89,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
 def test_at_rest_the_drive_takes_what_either_beginning_asks():
     """Bars 2 and 4 of a rectangle begin to turn together, and bar 3 not at all."""
     friction = Friction.at(O2=0.1, A=0.2, B=0.3, O4=0.4)
-    scene = Scene(RECTANGLE, Motion(pi / 2, 0.0), effects=(friction,))
-    got = answered(scene)
+    got = answered(Scene(RECTANGLE, Motion(pi / 2, 0.0), effects=(friction,)))
     ends = got["torque_low"][0], got["torque"][0], got["torque_high"][0]
     assert ends == approx((-1.0, 0.0, 1.0), abs=1e-14)
 

@@ -26,7 +26,7 @@ from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import MASSLESS, crank_rocker
 
 
 def scenes():
@@ -127,7 +127,7 @@ def test_nothing_travels_that_the_formulas_computed():
     placed = {"bar": 4, "force": [3.0, 0.7], "arm": [0.05, 1.0]}
     assert data["loads"][0] == placed | {"moment": 0.0, "frame": "world"}
     assert data["effects"] == {"gravity": [9.81, -pi / 2], "viscous": {"O2": 0.01}}
-    massless = fourbar.Scene(bare(0.3, 0.1, 0.25, 0.22), scene.motion)
+    massless = fourbar.Scene(MASSLESS, scene.motion)
     assert set(protocol.scene_to_json(massless)) == {"lengths", "drive"}
 
 

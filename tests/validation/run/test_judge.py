@@ -29,7 +29,7 @@ from fourbar_validation.run import judge as judging
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_by, list_failed, spoil_formulas
-from tests.support.scenes import crank_rocker, find_angle
+from tests.support.scenes import UNIFORM, crank_rocker, find_angle
 
 
 class Echo:
@@ -151,11 +151,10 @@ def miss_the_reversal(answer):
 
 def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
     """At the dead centre of bar 4, with dry friction at O4."""
-    linkage = uniform(0.3, 0.1, 0.25, 0.22)
-    d, a, b, c = linkage.lengths
+    d, a, b, c = UNIFORM.lengths
     psi = find_angle(c, d, a + b)
     motion = Motion(np.array([psi - 0.2, psi, psi + 0.2]), 10.0)
-    scene = Scene(linkage, motion, effects=(Friction.at(O4=0.5),))
+    scene = Scene(UNIFORM, motion, effects=(Friction.at(O4=0.5),))
     rows = rows_of(miss_the_reversal, scene)
     for quantity in COMPARED_QUANTITIES:
         row = rows[quantity]

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from pytest import mark
 
-from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, uniform
+from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import ReleasedAnswer
@@ -20,7 +20,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report, make_question
-from tests.support.scenes import WEIGHT, recommand, relink
+from tests.support.scenes import UNIFORM_PARALLELOGRAM, WEIGHT, recommand, relink
 
 
 def falling(coupler=0.15):
@@ -124,7 +124,7 @@ def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_sta
     """The couples of dry friction that hold it are those of its own assembly."""
     friction = Friction.at(**dict.fromkeys(("O2", "A", "B", "O4"), 5.0))
     motion = Motion(np.radians(250.0), 0.0, branch=branch, free=Free(0.1, 2))
-    scene = Scene(uniform(0.3, 0.1, 0.3, 0.1), motion, effects=(Gravity(), friction))
+    scene = Scene(UNIFORM_PARALLELOGRAM, motion, effects=(Gravity(), friction))
     assert not solve(scene).omega_2.any()
     rows = judge("held", scene).rows
     assert {row.engine for row in rows if row.quantity == "F43"} >= {

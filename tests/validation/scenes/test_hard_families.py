@@ -11,7 +11,7 @@ import numpy as np
 from pytest import mark
 
 import fourbar
-from fourbar import Motion, Sweep, solve, uniform
+from fourbar import Motion, Sweep, solve
 from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.scene import Scene
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED, VERDICTS
@@ -49,7 +49,7 @@ from fourbar_validation.scenes.random import DrawnType
 from tests.support.engine_limits import MEASURED
 from tests.support.here import judge_by, spoil_formulas
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker, recommand
+from tests.support.scenes import UNIFORM, crank_rocker, recommand
 from tests.validation.run.test_judge import rows_of
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
@@ -386,16 +386,14 @@ def test_the_file_as_shipped_is_driven_within_the_declared_limits_of_mujoco(name
     [(0.0, 0.101, UNDECIDED), (0.0, 6.0, AGREES), (5e6, 0.101, AGREES)],
 )
 def test_a_servo_of_a_narrow_and_fast_sweep_is_beyond_mujoco(alpha, stop, verdict):
-    motion = Motion(Sweep(0.1, stop, 4), 2000.0, alpha)
-    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
+    scene = Scene(UNIFORM, Motion(Sweep(0.1, stop, 4), 2000.0, alpha))
     row = compare_shipped("fast", scene, fourbar.command(scene))
     assert row.verdict == verdict
     assert (QUICKEST_START.reason in row.reason) == (verdict == UNDECIDED)
 
 
 def test_a_file_that_starts_almost_at_rest_is_judged_by_the_speed_that_it_reaches():
-    motion = Motion(Sweep(0.1, 6.0, 4), 1e-9, 100.0)
-    scene = Scene(uniform(0.3, 0.1, 0.25, 0.22), motion)
+    scene = Scene(UNIFORM, Motion(Sweep(0.1, 6.0, 4), 1e-9, 100.0))
     row = compare_shipped("quickening", scene, fourbar.command(scene))
     assert row.verdict == AGREES, row
 

@@ -35,7 +35,6 @@ from fourbar import (
     Viscous,
     load,
     solve,
-    uniform,
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals, limit_positions
@@ -47,8 +46,8 @@ from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows, slow_but
 from tests.support.scenes import (
     CYLINDER,
-    PARALLELOGRAM,
     RESTING,
+    UNIFORM_PARALLELOGRAM,
     WEIGHT,
     crank_rocker,
     recommand,
@@ -131,8 +130,7 @@ def texts_shown(figure):
 
 def words_of(figure):
     """All texts of a figure, in one line."""
-    shown = " ".join(text.get_text() for text in figure.findobj(Text))
-    return " ".join(shown.split())
+    return " ".join(" ".join(text.get_text() for text in figure.findobj(Text)).split())
 
 
 def clashes(figure):
@@ -375,22 +373,20 @@ def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
 @mark.parametrize("angle, position", [(radians(60.0), None), (None, radians(60.0))])
 def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, position):
     """Bar 4 hangs between two pins at 60 deg: its moment is m g cos 60 deg c/8."""
-    linkage = uniform(*PARALLELOGRAM)
-    scene = Scene(linkage, Motion(angle, 0.0), effects=WEIGHT)
+    scene = Scene(UNIFORM_PARALLELOGRAM, Motion(angle, 0.0), effects=WEIGHT)
     figure = composed(scene, "bars", position=position)
-    moment = 1e3 * linkage.output.mass * 9.81 * 0.5 * 0.1 / 8.0
-    words = f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm"
-    assert words in words_of(figure)
+    moment = 1e3 * UNIFORM_PARALLELOGRAM.output.mass * 9.81 * 0.5 * 0.1 / 8.0
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words_of(figure)
     assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
 
 
 def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_moment():
     """That of bar 4 has no pin forces: m g c/8 at 0 deg."""
-    linkage = uniform(*PARALLELOGRAM)
     motion = Motion(Sweep(0.0, tau, 12), 1.0)
-    figure = composed(Scene(linkage, motion, effects=WEIGHT), "bars")
-    words = words_of(figure)
-    moment = 1e3 * linkage.output.mass * 9.81 * 0.1 / 8.0
+    words = words_of(
+        composed(Scene(UNIFORM_PARALLELOGRAM, motion, effects=WEIGHT), "bars")
+    )
+    moment = 1e3 * UNIFORM_PARALLELOGRAM.output.mass * 9.81 * 0.1 / 8.0
     assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words
     assert "Pin forces grow without bound" in words
 
@@ -499,7 +495,7 @@ OTHERS = {
     "law": by_law(),
     "release": released(),
     "three rockers": thesis(),
-    "no torque": Scene(uniform(*PARALLELOGRAM), Motion([0.3], 1.0), 3),
+    "no torque": Scene(UNIFORM_PARALLELOGRAM, Motion([0.3], 1.0), 3),
 }
 REFUSED = read_rows(r"""
 crank-rocker | {} | must
