@@ -13,7 +13,7 @@ import fourbar
 from fourbar import Motion, Point, solve
 from fourbar.solution import unwrap
 from tests.support.rows import refused
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import cis, crank_rocker
 
 
 def pointed():
@@ -74,6 +74,6 @@ def test_a_data_frame_names_the_unit_of_each_column():
 def test_angles_of_several_turns_are_continuous_across_gaps(missing):
     sweep = np.array([np.linspace(-3.0, 16.0, 30), np.linspace(2.0, -14.0, 30)])
     sweep[:, missing] = np.nan
-    wrapped = np.angle(np.exp(1j * sweep))
+    wrapped = np.angle(cis(sweep))
     unwrap(wrapped)
     assert_allclose(wrapped, sweep, atol=1e-14)

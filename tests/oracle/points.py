@@ -16,6 +16,7 @@ from fourbar_validation.compare.tolerance import (
     find_error,
     sum_lengths,
 )
+from tests.support.scenes import cis
 
 
 def points(question):
@@ -74,12 +75,12 @@ def move_points(scene, reference):
             motion[bar] = zero if values is None else values
 
     def swing(bar, distance, angle):
-        arm = distance * np.exp(1j * (theta[bar] + angle))
+        arm = distance * cis(theta[bar] + angle)
         return [arm, 1j * speed[bar] * arm, (1j * growth[bar] - speed[bar] ** 2) * arm]
 
     first_pins = {
         3: swing(2, link.input.length, 0.0),
-        4: [link.ground * np.exp(1j * theta[1]), 0.0 * zero, 0.0 * zero],
+        4: [link.ground * cis(theta[1]), 0.0 * zero, 0.0 * zero],
     }
     moved = {}
     for point in state_from_pins(scene).points:

@@ -62,6 +62,11 @@ RESTING = crank_rocker(
 """Held by the drive and by dry friction, whose couple at O2 is up to 0.2 N m."""
 
 
+def cis(angle):
+    """Return the unit vector of an angle as a complex number."""
+    return np.exp(1j * angle)
+
+
 def find_angle(side, first, second):
     """Return the angle between two sides of a triangle, opposite to the third."""
     return acos((first**2 + second**2 - side**2) / (2.0 * first * second))

@@ -20,6 +20,7 @@ from fourbar_validation.compare.pins import (
     find_mass,
     state_from_pins,
 )
+from tests.support.scenes import cis
 
 _PINS = ("O2", "A", "B", "O4")
 _SIGNS = np.array([[1, 0, 0], [-1, 1, 0], [0, -1, 1], [0, 0, 1]])
@@ -77,7 +78,7 @@ class Bodies:
         link = scene.linkage
         self.newton_steps = newton_steps
         self.scene, self.lengths = scene, link.lengths
-        self.ground = link.ground * np.exp(1j * link.ground_angle)
+        self.ground = link.ground * cis(link.ground_angle)
         bars = [link.bar(k) for k in (2, 3, 4)]
         self.mass = np.array([find_mass(bar) for bar in bars])
         self.inertia = np.array([find_inertia(bar) for bar in bars])
@@ -91,17 +92,17 @@ class Bodies:
     def close(self, theta_2, branch):
         """Find the nine coordinates by Newton's method on the constraints."""
         _, a, b, c = self.lengths
-        A = a * np.exp(1j * theta_2)
+        A = a * cis(theta_2)
         diagonal = self.ground - A
         e = abs(diagonal)
         cosine = (b * b + e * e - c * c) / (2.0 * b * e)
         if abs(cosine) > 1.0:
             return False
         theta_3 = np.angle(diagonal) + branch * math.acos(cosine)
-        B = A + b * np.exp(1j * theta_3)
+        B = A + b * cis(theta_3)
         self.theta_2 = theta_2
         self.theta = np.array([theta_2, theta_3, np.angle(B - self.ground)])
-        self.z = np.array([0j, A, self.ground]) + self.centre * np.exp(1j * self.theta)
+        self.z = np.array([0j, A, self.ground]) + self.centre * cis(self.theta)
         gap = self._gap()
         for _ in range(self.newton_steps):
             x, y, turn = np.split(np.linalg.solve(self.jacobian(), -gap), 3)
@@ -116,7 +117,7 @@ class Bodies:
     @property
     def turned(self):
         """Return the arms in world axes with their signs."""
-        return _SIGNS * self.arms * np.exp(1j * self.theta)
+        return _SIGNS * self.arms * cis(self.theta)
 
     def _gap(self):
         gaps = _SIGNS @ self.z + self.turned.sum(axis=1)
@@ -173,7 +174,7 @@ class Bodies:
         """Return a load's force and its arm from the mass centre, in world axes."""
         if load.force is None:
             return 0j, 0j
-        turned = np.exp(1j * self.theta[load.bar - 2])
+        turned = cis(self.theta[load.bar - 2])
         push = polar(load.force) * (turned if load.frame == "bar" else 1.0)
         if load.place is None:
             return push, polar(load.arm)
@@ -183,4 +184,4 @@ class Bodies:
 
 def polar(pair):
     """Return a vector of a size and a direction."""
-    return complex(pair[0] * np.exp(1j * pair[1]))
+    return complex(pair[0] * cis(pair[1]))

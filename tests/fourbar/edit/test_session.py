@@ -31,6 +31,7 @@ from fourbar.edit.scene_entries import SceneDocument, list_offers
 from fourbar.edit.session import MOST_KEPT, MOST_SOLVED_ANEW, Session
 from fourbar_validation.places import MODELS
 from tests.support.rows import read_rows, refused, slow_but
+from tests.support.scenes import cis
 
 CRANK_ROCKER = MODELS / "crank_rocker.toml"
 
@@ -168,7 +169,7 @@ def test_the_page_has_the_angles_of_each_dead_centre(session):
     for words, *angles in turns:
         assert words == "dead centre: bars 2, 3 in line"
         assert math.sin(angles[1] - angles[0]) == approx(0.0, abs=1e-12)
-        loop = np.array([0.1, 0.25, -0.22]) @ np.exp(1j * np.array(angles))
+        loop = np.array([0.1, 0.25, -0.22]) @ cis(np.array(angles))
         assert loop == approx(0.3, abs=1e-9)
 
 
@@ -296,10 +297,10 @@ def on_bar(s, bar, vector):
     """Return where a vector from the first pin of a bar ends."""
     linkage = s.scene.linkage
     if bar == 3:
-        return complex(*s.A[0]) + vector * np.exp(1j * s.theta_3[0])
+        return complex(*s.A[0]) + vector * cis(s.theta_3[0])
     if bar == 4:
         O4 = cmath.rect(linkage.ground, linkage.ground_angle)
-        return O4 + vector * np.exp(1j * s.theta_4[0])
+        return O4 + vector * cis(s.theta_4[0])
     return vector * cmath.exp(1j * linkage.ground_angle)
 
 
@@ -409,7 +410,7 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     pull, angle = loaded.now.scene.loads[3].force
     assert pull == approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
     turned = angle + (float(s.theta_3[0]) if frame == "bar" else 0.0)
-    acts = pull * np.exp(1j * turned)
+    acts = pull * cis(turned)
     assert np.angle(acts / arrow) == approx(0.0, abs=0.02)
 
 
@@ -448,7 +449,7 @@ def test_another_command_goes_over_the_position_that_is_shown(session, shown):
     """
     ask(session, "command", command="theta_4", theta_2=shown)
     covered = solve(session.now.scene, "position").theta_2
-    assert np.abs(np.exp(1j * covered) - np.exp(1j * shown)).min() < 0.03
+    assert np.abs(cis(covered) - cis(shown)).min() < 0.03
 
 
 def test_what_does_not_move_cannot_be_commanded(session):

@@ -24,7 +24,7 @@ from fourbar import (
 )
 from fourbar.files import loads
 from tests.support.rows import read_rows
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import cis, crank_rocker
 
 SLOPES = 1e-7
 """Relative: a central difference over 1e-5 rad, of positions with 16 digits."""
@@ -66,7 +66,7 @@ def make_door(motion, acts='acts = "push"'):
 
 def close(theta):
     """Return A and B of the door, m, by the intersection of two circles."""
-    A = 0.025 * np.exp(1j * theta)
+    A = 0.025 * cis(theta)
     to_O4 = 0.06 - A
     d = abs(to_O4)
     along = (0.07**2 - 0.055**2 + d * d) / (2.0 * d)

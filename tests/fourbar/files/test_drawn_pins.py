@@ -20,6 +20,7 @@ from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
 from tests.support.rows import read_rows, refused, slow_but
+from tests.support.scenes import cis
 
 EPS = 2.0**-52
 K = 8.0
@@ -47,7 +48,7 @@ def random_pins(random, kind):
     elif kind == "kite":  # A mirrored in the line from O2 to B
         along = (B - O2) / abs(B - O2)
         O4 = O2 + along * ((A - O2) / along).conjugate()
-    shift = 10.0 ** random.uniform(-2.0, 1.0) * np.exp(1j * random.uniform(0.0, 7.0))
+    shift = 10.0 ** random.uniform(-2.0, 1.0) * cis(random.uniform(0.0, 7.0))
     return [complex(scale * (pin + shift)) for pin in (O2, A, B, O4)]
 
 
@@ -280,7 +281,7 @@ def test_a_ground_by_coordinates_and_a_place_drawn_on_it():
     foot, O4 = 0.433 - 1.7682j, -0.12 - 0.07j
 
     def stroke(angle):
-        d = 0.455 * np.exp(1j * angle) - O4
+        d = 0.455 * cis(angle) - O4
         along = (0.57**2 + abs(d) ** 2 - 0.124**2) / (2.0 * abs(d))
         pin = O4 + d / abs(d) * (along - 1j * np.sqrt(0.57**2 - along**2))
         return abs(pin - foot)
@@ -327,7 +328,7 @@ def test_a_parallelogram_drawn_on_a_grid_is_one():
     for _ in range(200):
         O2 = complex(*random.uniform(-200.0, 200.0, 2))
         arm, base = (
-            random.uniform(150.0, 300.0) * np.exp(1j * random.uniform(0.0, 7.0))
+            random.uniform(150.0, 300.0) * cis(random.uniform(0.0, 7.0))
             for _ in range(2)
         )
         if abs(np.sin(np.angle(arm / base))) < 0.1:

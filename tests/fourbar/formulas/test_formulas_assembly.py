@@ -9,7 +9,7 @@ from pytest import mark, skip
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.mobility import turns_fully
 from tests.support.rows import read_rows
-from tests.support.scenes import bare
+from tests.support.scenes import bare, cis
 
 LINKAGES = read_rows("""
 parallelogram | 0.3 0.1 0.3 0.1
@@ -41,8 +41,8 @@ def test_an_assembly_goes_on_smoothly_through_change_points(name, lengths, bar):
         rates = {f"theta_{bar}": q, f"omega_{bar}": 1.0}
         ours = solve(Scene(linkage, Motion(**rates, branch=branch)), "velocity")
         d, a, b, c = linkage.lengths
-        u2, u3, u4 = (np.exp(1j * ours[f"theta_{number}"]) for number in (2, 3, 4))
-        gap = a * u2 + b * u3 - d * np.exp(1j * GROUND_ANGLE) - c * u4
+        u2, u3, u4 = (cis(ours[f"theta_{number}"]) for number in (2, 3, 4))
+        gap = a * u2 + b * u3 - d * cis(GROUND_ANGLE) - c * u4
         assert np.abs(gap).max() <= CLOSED * sum(linkage.lengths)
         # the sine's sign in the first half turn is the assembly's name
         first, second = (ours[f"theta_{k}"][0] for k in (2, 3, 4) if k != bar)

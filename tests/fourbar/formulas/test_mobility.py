@@ -23,7 +23,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, draw_linkage
+from tests.support.scenes import bare, cis, draw_linkage
 
 EPS = 2.0**-52
 ANGLE = 8.0 * EPS
@@ -59,7 +59,7 @@ def nearly_special(seed, count):
 def closes(bars, theta_2):
     """Return how far circles of radii b, c about A, O4 are from missing, m."""
     d, a, b, c = bars.lengths
-    distance = np.abs(a * np.exp(1j * theta_2) - d * np.exp(1j * bars.ground_angle))
+    distance = np.abs(a * cis(theta_2) - d * cis(bars.ground_angle))
     return np.minimum(b + c - distance, distance - abs(b - c))
 
 
@@ -174,8 +174,8 @@ def test_limits_keep_their_digits_and_close_the_loop_with_two_bars_in_line(bar):
             # relative to itself
             alone = bar == 2 and theta_1 == 0.0 and 0.0 < value < pi
             assert error <= ANGLE * (psi if alone else 4 * pi)
-            u2, u3, u4 = (np.exp(1j * angles[k]) for k in MOVING_BARS)
-            gap = a * u2 + b * u3 - d * np.exp(1j * theta_1) - c * u4
+            u2, u3, u4 = (cis(angles[k]) for k in MOVING_BARS)
+            gap = a * u2 + b * u3 - d * cis(theta_1) - c * u4
             assert abs(gap) <= ANGLE * tau * sum(bars.lengths)
             # bars 2, 3 lie along each other where stretched; the output runs from
             # its far end

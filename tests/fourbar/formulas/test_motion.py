@@ -11,7 +11,7 @@ from pytest import approx, mark
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
-from tests.support.scenes import PARALLELOGRAM, bare
+from tests.support.scenes import PARALLELOGRAM, bare, cis
 
 EPS = 2.0**-52
 
@@ -91,7 +91,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
         link = bare(d, a, b, b)
         moving = compute_state(link, psi, 1, 2.0)
         singular = find_singular(moving.position)
-        e = np.abs(d - a * np.exp(1j * psi))
+        e = np.abs(d - a * cis(psi))
         assert assembled(moving).all()
         assert np.array_equal(singular, e / b <= 8.0 * EPS)
         assert np.array_equal(np.isnan(moving.omega(3)), singular)

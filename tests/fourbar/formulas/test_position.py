@@ -1,6 +1,5 @@
 """Directions and coefficients of every reading against circles in many digits."""
 
-import numpy as np
 from pytest import approx, mark
 
 from fourbar import uniform
@@ -9,7 +8,7 @@ from fourbar.formulas.path import compute_state, drive_sine_of_triangle
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows
-from tests.support.scenes import bare
+from tests.support.scenes import bare, cis
 
 EPS = 2.0**-52
 FEW_ROUNDINGS = 8.0 * EPS
@@ -52,7 +51,7 @@ def test_digits_are_kept_where_the_diagonal_is_short(stated, psi, sign):
 
     bars, half = loop(*lengths), half_angle(loop(*lengths), psi)
     for theta_1 in (0.0, 0.4):
-        u1 = complex(np.exp(1j * theta_1))
+        u1 = complex(cis(theta_1))
         plain = close_loop(bars, u1, direction(psi) * u1, half, assembly)
         corrected = take_sines_of_rates(bars, plain, coefficients(bars, plain))
         for name, of in (("u3", exact["u_3"]), ("u4", exact["u_4"])):

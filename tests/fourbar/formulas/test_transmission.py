@@ -10,7 +10,7 @@ from fourbar import Motion, Scene, solve, transmission_extremes
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.derived import derive
 from tests.fourbar.formulas.test_points import random_positions
-from tests.support.scenes import draw_linkage
+from tests.support.scenes import cis, draw_linkage
 
 EPS = 2.0**-52
 ANGLE = 16.0 * EPS
@@ -55,7 +55,7 @@ def test_extremes_are_those_of_a_scan():
         ):
             # it is the angle of a position
             assert 0.0 <= theta_2 - theta_1 <= pi * (1.0 + EPS) + 2.0 * EPS
-            e = abs(a * np.exp(1j * theta_2) - d * np.exp(1j * theta_1))
+            e = abs(a * cis(theta_2) - d * cis(theta_1))
             assert e**2 == approx(b * b + c * c - 2 * b * c * cos(end), abs=64 * EPS)
         assert extremes.worst == min(extremes.least, pi - extremes.greatest)
     assert len(kinds) == 4

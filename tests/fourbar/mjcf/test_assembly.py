@@ -7,7 +7,6 @@ import re
 from functools import partial
 from xml.etree import ElementTree
 
-import numpy as np
 from pytest import approx, mark, raises
 
 import fourbar
@@ -15,7 +14,7 @@ from fourbar import Gravity, Motion, Torsion, Viscous, solve
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
-from tests.support.scenes import crank_rocker
+from tests.support.scenes import cis, crank_rocker
 
 
 def test_a_file_for_genesis_says_what_it_leaves_out():
@@ -57,7 +56,7 @@ def test_an_sdf_stands_closed_at_B_and_its_joints_are_damped(reader):
     places = {}
     for link in root.iter("link"):
         x, y, *_, turn = map(float, link.findtext("pose").split())
-        places[link.get("name")] = complex(x, y), np.exp(1j * turn)
+        places[link.get("name")] = complex(x, y), cis(turn)
 
     def stand(bar, along):
         foot, direction = places[bar]

@@ -24,7 +24,7 @@ from fourbar import (
 from fourbar.mjcf import write_mjcf
 from fourbar_lab.stability import compute_reference
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import WEIGHT, crank_rocker, recommand
+from tests.support.scenes import WEIGHT, cis, crank_rocker, recommand
 
 BARS = 10.0
 """Of an error bar, as `stability` allows."""
@@ -46,8 +46,8 @@ def scene(bar, stroke, side="left", **motion):
 
 def test_the_sides_are_left_and_right_of_the_line_from_pin_to_ground_end():
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        end = 0.12 * np.exp(1j * (solve(scene(2, 0.3, side)).theta_2[0] + 0.4))
-        ground = 0.3 * np.exp(1j * (2.2 + crank_rocker().linkage.ground_angle))
+        end = 0.12 * cis(solve(scene(2, 0.3, side)).theta_2[0] + 0.4)
+        ground = 0.3 * cis(2.2 + crank_rocker().linkage.ground_angle)
         assert sign * (np.conj(ground) * end).imag > 0.0
 
 

@@ -55,6 +55,7 @@ from tests.support.scenes import (
     WEIGHT,
     balanced_lamp,
     bare,
+    cis,
     crank_rocker,
     find_angle,
     thesis,
@@ -685,7 +686,7 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     ground = Place(1, (0.1, -1.5))
     if bar == 3:
         met = solve(replace(scene, motion=Motion(radians(40.0))))
-        z = 0.1 * np.exp(1j * met.theta_2[0]) + 0.1 * np.exp(1j * met.theta_3[0])
+        z = 0.1 * cis(met.theta_2[0]) + 0.1 * cis(met.theta_3[0])
         ground = Place(1, (abs(z), np.angle(z)))
     drive = LinearDrive(ground, Place(bar, (0.1, 0.0)))
     pushed = replace(scene, drive_bar=None, drive=drive)

@@ -28,7 +28,7 @@ from fourbar.show.studies import write_sensitivity
 from fourbar.studies.keys import list_entries, read_place
 from fourbar_validation.places import MODELS
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
-from tests.support.scenes import PARALLELOGRAM, WEIGHT, find_angle
+from tests.support.scenes import PARALLELOGRAM, WEIGHT, cis, find_angle
 
 EXACT = 1e-10
 """Of the derivative, or of what the quantity would change by if it were proportional to
@@ -115,7 +115,7 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     number = read_place(nominal, list_entries(nominal)[key].place)
     beside = {key: np.array([number - step, number + step])}
     below, above = solve(vary(nominal, beside))[name]
-    return np.angle(np.exp(1j * (above - below))) / (2.0 * step)
+    return np.angle(cis(above - below)) / (2.0 * step)
 
 
 @mark.parametrize("branch", [1, -1])

@@ -20,6 +20,7 @@ from tests.support.scenes import (
     CYLINDER,
     UNIFORM_PARALLELOGRAM,
     WEIGHT,
+    cis,
     crank_rocker,
     meet_circles,
     recommand,
@@ -36,7 +37,7 @@ def find_crank(scene, theta_4, side):
     the left of the line from O2 to B, -1 to the right.
     """
     d, a, b, c = scene.linkage.lengths
-    B = d * np.exp(1j * scene.linkage.ground_angle) + c * np.exp(1j * theta_4)
+    B = d * cis(scene.linkage.ground_angle) + c * cis(theta_4)
     return np.angle(meet_circles(0.0, B, a, b, side))
 
 
@@ -154,7 +155,7 @@ def test_an_angle_of_the_output_is_a_position_of_a_crank(ends, side, read, judge
     assert len(theta_4) > 3
     table = read(tabulate("theta_4", theta_4, theta_4, "{:.0f}"))
     angles = find_row_commands(scene, table).at.angle
-    apart = np.angle(np.exp(1j * (angles - find_crank(scene, theta_4, side))))
+    apart = np.angle(cis(angles - find_crank(scene, theta_4, side)))
     np.testing.assert_allclose(apart, 0.0, atol=SAME_PLACE)
     turned = radians(ends[0]) - 0.1, radians(ends[1]) + 0.1
     assert ((angles > turned[0]) & (angles < turned[1])).all()

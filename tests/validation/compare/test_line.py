@@ -18,7 +18,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from tests.support.here import judge_by
-from tests.support.scenes import WEIGHT, crank_rocker, recommand
+from tests.support.scenes import WEIGHT, cis, crank_rocker, recommand
 from tests.validation.engines.test_engines import driven
 
 EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_time]
@@ -31,7 +31,7 @@ def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, ga
         skip(missing)
     at = crank_rocker(motion=Motion(1.0))
     linkage, (theta_4,) = at.linkage, solve(at, "position").theta_4
-    on_bar = linkage.ground + 0.2 * np.exp(1j * (theta_4 + 0.4 - linkage.ground_angle))
+    on_bar = linkage.ground + 0.2 * cis(theta_4 + 0.4 - linkage.ground_angle)
     near = Place(1, (abs(on_bar + gap), np.angle(on_bar + gap)))
     scene = crank_rocker(
         motion=Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),

@@ -41,7 +41,7 @@ from fourbar_validation.published.thesis import (
     make_model_scene,
 )
 from tests.support.rows import read_rows
-from tests.support.scenes import recommand
+from tests.support.scenes import cis, recommand
 
 LISTED = 0.5e-12
 """Half a unit of the last digit listed below."""
@@ -222,10 +222,10 @@ def test_open_loops_that_the_errata_state():
         usecols=range(5),
     )
     d, a, b, c = BAR_LENGTHS
-    unit = np.exp(1j * np.radians(rows)).T
+    unit = cis(np.radians(rows)).T
 
     def gaps(third, fourth):
-        crank = d * np.exp(1j * THETA_1) + a * unit[0]
+        crank = d * cis(THETA_1) + a * unit[0]
         return np.abs(crank + b * unit[third] + c * unit[fourth])
 
     first, second = gaps(1, 4), gaps(2, 3)

@@ -29,7 +29,7 @@ from fourbar_validation.run.judge import make_question
 from fourbar_validation.run.transformed import TRANSFORMATIONS, check_transformed
 from fourbar_validation.scenes.random import DrawnType, draw_random_scene
 from tests.support.rows import read_rows
-from tests.support.scenes import ON_COUPLER, WEIGHT, crank_rocker
+from tests.support.scenes import ON_COUPLER, WEIGHT, cis, crank_rocker
 
 EVERYTHING = (
     Gravity(9.81, -1.2),
@@ -234,7 +234,7 @@ def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     held = crank_rocker().linkage.ground_angle
 
     def turn(load):
-        return field(load) * np.exp(1j * (load.angle + 0.5 * np.pi - held))
+        return field(load) * cis(load.angle + 0.5 * np.pi - held)
 
     monkeypatch.setattr(Gravity, "field", property(turn))
     _, rows = ask(crank_rocker())
