@@ -95,6 +95,7 @@ WHOLE = {
     ),
     **{name: (write_acting(name), None, {}) for name in SPRUNG},
 }
+REFSAFE = int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
 ASKED_TWICE = 1e-6
 """Relative; the solver of the file stops at a tolerance of 1e-8 of its own."""
 RIGID = 1e-8
@@ -246,6 +247,19 @@ def test_the_start_of_a_simulation_is_not_judged():
         settled = errors[quantity].max() / scale
         assert settled < 0.02
         assert single.errors()[quantity].max() / scale > 10.0 * settled
+
+
+@pytest.mark.parametrize(
+    "solref, flags, constant",
+    [((0.02, 1), 0, 0.06), ((0.02, 1), REFSAFE, 0.02), ((-99, -50), 0, 0.04)],
+)
+def test_a_time_constant_below_two_timesteps_is_raised(solref, flags, constant):
+    """MuJoCo does so, but where the closure states stiffness and damping."""
+    inside, _ = open_loop.__wrapped__("finger")
+    inside.model.opt.timestep = 0.03
+    inside.model.opt.disableflags |= flags
+    inside.model.eq_solref[inside.loop.equality] = solref
+    assert inside.find_constant() == approx(constant)
 
 
 def mirror(point, one, other):

@@ -752,10 +752,12 @@ class LoopInside:
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""
         stiffness, damping = self.model.eq_solref[self.loop.equality].tolist()
-        if stiffness > 0.0 or not damping:
-            return float(max(stiffness, 0.0))
+        if stiffness > 0.0:
+            # MuJoCo raises it to two timesteps unless a flag forbids that
+            is_raised = is_enabled(self.model, "refsafe")
+            return float(max(stiffness, 2.0 * self.model.opt.timestep * is_raised))
         # stated as -stiffness and -damping: that of a critically damped closure
-        return float(2.0 / abs(damping))
+        return 2.0 / abs(damping) if damping else 0.0
 
     def answer_under_torque(
         self,
