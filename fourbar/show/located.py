@@ -10,7 +10,7 @@ import numpy as np
 from fourbar.errors import InputError, NotAssembledError, name_unit, write_in_units
 from fourbar.formulas.mobility import limit_positions
 from fourbar.linkage import require
-from fourbar.quantities import Array
+from fourbar.quantities import UNITS, Array
 from fourbar.quantities.units import read_bare
 from fourbar.scene import Command, Scene
 from fourbar.show.columns import read_column
@@ -35,6 +35,8 @@ LOCATED = 1e-11
 """Part of the motion within which an extreme is located."""
 CONSTANT = 1e-12
 """Part of a column's usual value within which two values are one."""
+TOLD = 1e-6
+"""Error bar, as a part of a value or of the usual one, beyond which it is rounding."""
 UNBOUNDED_BEYOND = 1e6
 """Times its usual size beyond which a column's largest value stands beside a pole."""
 EXTREMES = {"min": 1.0, "max": -1.0}
@@ -76,7 +78,8 @@ class _LocatedSearch:
     def __init__(self, scene: Scene, name: str) -> None:
         self.scene = scene
         self.name = name
-        stage = "error" if name.endswith("_error") else "force"
+        bar = f"{name}_error"
+        stage = "error" if name.endswith("_error") or bar in UNITS else "force"
         if find_last_stage(scene) == "position" or name in STATED_POSITIONS:
             stage = "position"
         # beside a position without a value it may grow without bound
@@ -91,6 +94,10 @@ class _LocatedSearch:
             self.unit = f"({column.unit})/({column.divisor})"
         self.places = self.course.places
         self.values = where_assembled(self.course.solution, column.values)
+        if stage == "error" and bar in UNITS:  # rounding beside a vanishing lever
+            sizes = np.abs(self.values)
+            most = TOLD * np.fmax(sizes, np.nanmedian(sizes))
+            self.values[self.course.solution[bar] > most] = np.nan
         self.is_extreme = np.zeros(len(self.values), dtype=bool)
 
     def _read(self, places: Array) -> Array:

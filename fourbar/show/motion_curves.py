@@ -151,10 +151,12 @@ class MotionCurves:
     def started(self) -> "MotionCurves":
         """Curves of the motion where its accelerations start it from rest.
 
-        They work against the whole of dry friction.
+        They work against the whole of dry friction. Along a law what stands beside an
+        instant at rest has it already, but beside a single instant nothing stands.
         """
-        starts = self.solution.time is None and find_starts(self.solution).any()
-        return self._begin(0.0) if starts else self
+        solution = self.solution
+        alone = solution.time is None or len(solution) == 1
+        return self._begin(0.0) if alone and find_starts(solution).any() else self
 
     def _begin(self, sense: float) -> "MotionCurves":
         """Return the curves with a beginning wherever the motion is at rest.
@@ -289,9 +291,14 @@ def _fit_curves(solution: Solution) -> MotionCurves:
             there = solve(scene, stage, at=command_at(scene, places))
             return _take_values(list_curves(there))
 
-        at_edges = list_curves(solve(scene, stage, at=command_at(scene, edges)))
-        wanted = {name: of_curve for name, (_, of_curve) in at_edges.items()}
-        return fit_panels(compute, edges, wanted, most_halvings, exact)
+        at_edges = solve(scene, stage, at=command_at(scene, edges))
+        wanted = {name: kind for name, (_, kind) in list_curves(at_edges).items()}
+        points = exact
+        if scene.motion.law is not None:
+            # what accelerates from rest bears what stands beside that instant
+            begins = edges[find_starts(at_edges) != 0.0]
+            points = exact[~np.isin(exact, begins)]
+        return fit_panels(compute, edges, wanted, most_halvings, points)
 
     positions = fit(_list_position_curves, "position", DEEP)
     for bar in MOVING_BARS:
