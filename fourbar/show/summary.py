@@ -232,12 +232,20 @@ class Facts:
             return [HeldRange.of(None, np.array(peaks))]
         bounds = np.array([solution[end] for end in both])
         places = solution.at.places.tolist()
+        law = self.scene.motion.law
+        times = np.array([] if law is None else law.time)
+        beside = [-math.inf, *places, math.inf]
         ranges = list[HeldRange]()
         for run in split_runs(rows):
             is_end = run[0] == len(solution) - 1 and rows[0] == 0
             if self.kind == "turn" and ranges and is_end:
                 continue
             ends = places[run[0]], places[run[-1]]
+            if len(run) > 1:  # a dwell lasts from one of a law's times to another
+                before, after = beside[run[0]], beside[run[-1] + 2]
+                starts = times[(before < times) & (times <= ends[0])]
+                stops = times[(ends[1] <= times) & (times < after)]
+                ends = max([*starts], default=ends[0]), min([*stops], default=ends[1])
             ranges.append(HeldRange.of(ends, bounds[:, run]))
         return ranges
 

@@ -39,7 +39,9 @@ from fourbar import (
 from fourbar.files.scene_file import read_tables
 from fourbar.formulas.mobility import find_intervals
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import command_at
 from fourbar.show.block import SceneBlock
+from fourbar.show.motion_curves import describe_motion
 from fourbar.show.plot.figures import draw_figure
 from fourbar.show.studies import write_equilibria
 from fourbar.show.summary import Facts
@@ -590,7 +592,7 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_time():
 def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero():
     """Friction of 5 N m at O2 holds; the law comes to rest at 0.3 and 0.8 rad."""
     torques = solve(crank_rocker(motion=Motion([0.3, 0.8], 0.0))).torque
-    law = Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=40)
+    law = Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=37)
     effects = (*WEIGHT, Friction.at(O2=5.0))
     text = block(crank_rocker(motion=Motion(law=law), effects=effects))
     first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
@@ -601,6 +603,24 @@ def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero(
     angles = (radians(10.0), radians(70.0))
     lifts = Motion(law=Law((0.0, 2.5), angles, omega_2=(0.0, 0.0)))
     assert "over the motion given, 0 mJ taken back" in block(crank_rocker(motion=lifts))
+
+
+def test_a_law_that_starts_and_stops_bears_what_stands_beside_these_instants():
+    """The start alone is that of a position with its acceleration."""
+    law = Law(
+        (0.0, 0.2, 0.6, 0.65), (1.2, 1.4, 2.2, 2.25), omega_2=(0.0, 2.0, 2.0, 0.0)
+    )
+    effects = (*WEIGHT, Friction.at(O2=0.5, O4=0.5))
+    scene = crank_rocker(motion=Motion(law=law), effects=effects)
+    inside = solve(scene, at=command_at(scene, np.linspace(1e-9, 0.65 - 1e-9, 4001)))
+    for pin in PIN_FORCES:
+        largest = np.hypot(*np.transpose(inside[pin])).max()
+        peak = describe_motion(solve(scene)).find_peak(pin)
+        assert peak.value == approx(largest, rel=1e-4)
+    first = solve(scene, at=command_at(scene, np.zeros(1)))
+    alone = Motion(1.2, 0.0, float(first.alpha_2[0]))
+    starts = Facts(solve(crank_rocker(motion=alone, effects=effects))).motion.start
+    assert Facts(first).motion.start.value == approx(starts.value, rel=1e-12)
 
 
 CORNERS = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))

@@ -292,6 +292,20 @@ def test_a_column_with_poles_says_that_it_grows_without_bound():
             locate(scene, "mechanical_advantage", value)
 
 
+def test_rounding_beside_a_vanishing_lever_is_no_value():
+    """A force up on a parallelogram's coupler bears its weight everywhere."""
+    scene = loads("""
+lengths = { ground = "0.2 m", input = "0.4 m", coupler = "0.2 m", output = "0.4 m" }
+bars.coupler.mass = "3 kg"
+motion.omega_2 = "0 rad/s"
+motion.theta_2 = { from = "20 deg", to = "160 deg", steps = 140 }
+drive = { bar = 3, from_pin = ["0.15 m", "0 deg"], direction = "90 deg" }
+effects.gravity = ["9.81 m/s^2", "-90 deg"]
+""")
+    with raises(NotAssembledError, match=r"no pos.* goes from 29\.43 to 29\.43 N"):
+        locate(scene, "drive_force", "29.4301 N")
+
+
 def test_a_linkage_is_searched_up_to_where_it_ceases_to_assemble():
     """There theta_3 grows as the root of the angle: by cosines, 0.01 deg from the end.
 
