@@ -210,7 +210,6 @@ damping | name="A" type="hinge" | name="A" type="hinge" damping="0.1" | pins.A.d
 | couple
 timestep | timestep="0.00100 | timestep="0.00200 | option.timestep | integration
 integrator | "RK4" | "Euler" | option.integrator | RK4 four
-impedance | 0.9999 0.9999 | 0.95 0.95 | closure.softness | at every timestep
 solimp | 0.9999 0.9999 | 0.95 0.95 | closure.solimp | (1-d)/d
 solref | solref="0.02 | solref="0.03 | closure.solref | sags under load
 tolerance | tolerance="0" | tolerance="1e-8" | option.tolerance | only 0 is tight
@@ -330,7 +329,8 @@ CAUSES = read_rows("""
 # solver parameters of friction that is not there
 plain | type="hinge" | type="hinge" solreffriction="0.1 1" |
 # a lighter bar makes the closure softer, and a heavier one stiffer: no difference
-plain | "0.5" | "0.25" | bars.coupler.mass, closure.softness
+plain | "0.5" | "0.25" | bars.coupler.mass, closure.weight
+plain | 0.9999 0.9999 | 0.95 0.95 | closure.solimp
 plain | "0.5" | "1" | bars.coupler.mass
 # a servo pulls where it is told nothing, and a motor does not
 sprung | </actuator> | <position tendon="spring_1" kp="100"/></actuator> | \
@@ -476,7 +476,7 @@ def test_an_entry_that_cannot_stand_alone_has_no_price():
 
 def mend_settings(first=0):
     """Mend two settings of another hand's file, or the second alone."""
-    settings = [("closure.softness", None), ("option.tolerance", 1e-8)]
+    settings = [("closure.solimp", None), ("option.tolerance", 1e-8)]
     return mend(STILL, other_plane(), MINE, settings[first:])
 
 

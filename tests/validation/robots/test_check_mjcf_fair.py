@@ -341,6 +341,19 @@ def test_the_cause_that_explains_the_error_stands_first(spoil, key, tmp_path):
     assert 0.0 < mass.cost < min(cost, 0.02)
 
 
+@pytest.mark.slow
+def test_contacts_hide_neither_what_a_setting_costs_nor_that_it_differs(tmp_path):
+    """The default solver's tolerance costs less than round-off, and is listed."""
+    text = colliding(write_mjcf(BARE, drive="none"))
+    text = text.replace("0.9999 0.9999", "0.95 0.95")
+    path = tmp_path / "soft.xml"
+    path.write_text(text.replace('tolerance="0"', 'tolerance="1e-8"'))
+    costs = {one.key: one.cost for one in judge_path("arm", BARE, path).differences}
+    assert costs["contacts"] > 1.0
+    assert costs["closure.solimp"] > 0.01
+    assert costs["option.tolerance"] < 1e-9
+
+
 def test_where_no_force_gives_the_acceleration_is_said(monkeypatch):
     """No couple is found beyond 45 deg: MuJoCo's acceleration jumps there."""
 

@@ -23,7 +23,7 @@ from fourbar_validation.engines.description import ModelEntry, Value
 
 SAME_NUMBER = 1e-12
 """Relative difference of a number that is computed in another order of operations."""
-_SAME_SOFTNESS = 1e-9
+_SAME_WEIGHT = 1e-9
 """Relative difference that is round-off. It follows from the places of both bodies in
 the world, which cost digits.
 """
@@ -33,7 +33,7 @@ ANOTHER_LINKAGE = 1e-3
 """Cost of a length above which torque and pin forces are those of another linkage. What
 the rounding of a length costs is below it.
 """
-_FINER_BELOW = ("option.timestep", "option.tolerance", "closure.softness")
+_FINER_BELOW = ("option.timestep", "option.tolerance", "closure.weight")
 _FINER_ABOVE = ("option.iterations", "option.ls_iterations")
 """Settings of which a smaller or a greater value has the smaller error."""
 ENTRIES_THAT_MAY_LACK = ("loads.", "tendons.", "actuators.")
@@ -211,8 +211,7 @@ def is_setting(key: str) -> bool:
 
     What it costs depends on the other settings of its file.
     """
-    settings = ("option.", "closure.sol", "closure.softness")
-    return key.startswith(settings) or key.endswith(
+    return key.startswith(("option.", "closure.sol")) or key.endswith(
         ("solreffriction", "solimpfriction")
     )
 
@@ -253,7 +252,7 @@ def _is_same_value(
         floor = length
     elif key.startswith(("gravity", "loads")):
         floor = 1.0
-    same = _SAME_SOFTNESS if key == "closure.softness" else SAME_NUMBER
+    same = _SAME_WEIGHT if key == "closure.weight" else SAME_NUMBER
     limit = same * max(np.abs(both).max(), floor)
     return bool(np.all(np.abs(apart) <= limit))
 

@@ -29,6 +29,7 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    HIDING,
     MOTION_OF_BARS,
     SETTINGS_OF_AN_SDF,
     InsideAnswer,
@@ -163,7 +164,9 @@ def judge_file(
             mend = partial(examined, _MENDED, scene, file, held)
             priced = _price(differences, rows, scene, at, judge, mend)
             differences = [
-                one for one in priced if one.cost is None or one.cost > _NOTHING
+                one
+                for one in priced
+                if one.cost is None or one.cost > _NOTHING or is_setting(one.key)
             ]
     notes = [*theirs.notes]
     if file.kind != "URDF" and (parts := list_unread(file.text)):
@@ -199,12 +202,16 @@ def _price(
             left.append(one)
         else:
             yield price(one, judge(answers=[changed]), ())
+    left.sort(key=lambda one: not one.key.endswith(HIDING))
     mended = mend([(one.key, one.generated) for one in left])
     for one, measured in zip(left, mended, strict=True):
         if measured is None:
             yield one
         else:
-            yield price(one, rows, judge(answers=list_answers(measured)))
+            after = judge(answers=list_answers(measured))
+            yield price(one, rows, after)
+            if one.key.endswith(HIDING):
+                rows = after
 
 
 def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:

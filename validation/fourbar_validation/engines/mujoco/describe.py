@@ -76,8 +76,8 @@ _MJCF_WORDS = {
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
 PARALLEL_AXES = 1e-9
 """rad; axes that are nearer to each other are parallel but for rounding."""
-_SOFTEST, STIFFEST = 1e-4, 0.9999
-"""Impedances between which MuJoCo keeps that of a constraint."""
+STIFFEST = 0.9999
+"""Greatest impedance that MuJoCo lets a constraint have."""
 
 
 def describe_model(seen: SeenLoop, flywheel: float = 0.0) -> Described:
@@ -220,10 +220,7 @@ class _Description:
         bodies = [model.eq_obj1id[number], model.eq_obj2id[number]]
         if model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
             bodies = [model.site_bodyid[site] for site in bodies]
-        weight = float(model.body_invweight0[bodies, 0].sum())
-        impedance = float(np.clip(model.eq_solimp[number, 0], _SOFTEST, STIFFEST))
-        softness = (1.0 - impedance) / impedance * weight
-        self.put("closure.softness", softness, element, "solimp")
+        self.put("closure.weight", model.body_invweight0[bodies, 0].sum())
 
     def add_loads(self) -> None:
         """Describe what actuators exert with a control of 0.
@@ -395,7 +392,7 @@ def mend_entry(
         setattr(model.opt, rest, np.asarray(value).astype(np.asarray(was).dtype))
     elif key == "closure.solref":
         model.eq_solref[seen.closure] = value
-    elif key in ("closure.solimp", "closure.softness"):
+    elif key == "closure.solimp":
         if np.all(model.eq_solimp[seen.closure, :2] == STIFFEST):
             return False
         model.eq_solimp[seen.closure, :2] = STIFFEST

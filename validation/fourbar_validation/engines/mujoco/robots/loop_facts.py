@@ -35,6 +35,8 @@ DIGITS_OF_A_MODEL = 12
 """Significant digits of a number of the scene. Those beyond are round-off of the
 compiler.
 """
+HIDING = ("contacts", ".range")
+"""Ends of the keys of differences whose cost hides that of others."""
 SETTINGS_OF_AN_SDF = (
     "an SDF or a URDF states neither softness nor solver: MuJoCo's defaults act, and"
     " only an MJCF of the robot can state others"

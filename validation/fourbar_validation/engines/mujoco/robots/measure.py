@@ -47,6 +47,7 @@ from fourbar_validation.engines.mujoco.robots.closures import (
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
+    HIDING,
     SETTINGS_OF_AN_SDF,
     InsideAnswer,
     LoopMeasurement,
@@ -406,17 +407,22 @@ def examine_mended(
 ) -> list[LoopMeasurement | None]:
     """Measure a file with one entry at a time as in the generated one.
 
-    None stands for an entry that cannot be set, or if time is up.
+    Those that hide others stay so. None stands for an entry that cannot be set, or if
+    time is up.
     """
     found = find_loop_of_scene(file, scene, options)
     end = time.process_time() + PRICING
     measured = []
-    for key, value in changes:
+    kept: list[tuple[str, Value | None]] = []
+    for change in changes:
         seen = found.see()
         one = None
-        if time.process_time() < end and mend_entry(seen, key, value):
+        mended = all(mend_entry(seen, *each) for each in (*kept, change))
+        if mended and time.process_time() < end:
             with collect_warnings():
                 one = measure_loop(found, options, seen.model, briefly=True)
+            if change[0].endswith(HIDING):
+                kept.append(change)
         measured.append(one)
     return measured
 
