@@ -418,22 +418,16 @@ def _write_positions(
     out: Path | None,
 ) -> str:
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
-    from fourbar.show.acting import (
-        list_arm_notes,
-        list_spring_notes,
-        list_torsion_notes,
-    )
+    from fourbar.show.acting import list_notes
     from fourbar.show.columns import choose_columns
     from fourbar.show.duty import list_duty
     from fourbar.show.path_rows import collect_paths
     from fourbar.show.tables import print_positions
 
-    scene = solution.scene
     columns = [] if names is None else choose_columns(solution, names)
     if form == "json":
         motor = list_duty(solution, units)
-        notes = [*list_arm_notes(scene), *list_spring_notes(scene, solution, units)]
-        notes += list_torsion_notes(scene, solution, units)
+        notes = list_notes(solution, units)
         paths = collect_paths(solution, units)
         return write_json(solution, units, motor=motor, notes=notes, paths=paths)
     if form == "csv":

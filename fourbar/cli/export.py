@@ -1,8 +1,7 @@
 """The commands that write files: pictures, models for simulators; and the workbench."""
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import wraps
 from itertools import chain, count
 from pathlib import Path
@@ -66,7 +65,8 @@ _A_LENGTH = re.compile(r"[\d.]+\w*")
 def _export_command(command: Callable[..., str]) -> Callable[..., None]:
     """Add SCENE, --lengths and --omega; what the command makes of a scene is written.
 
-    One of the first two is given.
+    One of the first two is given. The defaults of a scene of lengths are told at the
+    end.
     """
 
     @click.argument("scene", type=given.FILE_PATH, required=False)
@@ -89,44 +89,33 @@ def _export_command(command: Callable[..., str]) -> Callable[..., None]:
         out: Path,
         **options: Any,
     ) -> None:
-        with _open_or_make_scene(scene, lengths, omega, out) as described:
-            given.print_to(command(described, **options), out)
-
-    return written
-
-
-@contextmanager
-def _open_or_make_scene(
-    scene: Path | None,
-    lengths: tuple[str, ...] | None,
-    omega: str | None,
-    out: Path,
-) -> Iterator[Scene]:
-    """Open the scene, or make one of the lengths; its defaults are told at the end."""
-    if lengths is not None and _A_LENGTH.fullmatch(str(scene)):
-        raise click.UsageError(f"--lengths are four: {ELSEWHERE}")
-    if (scene is None) == (lengths is None):
-        raise click.UsageError("give a scene file or --lengths D A B C, one of the two")
-    if scene is not None:
-        if omega is not None:
+        if lengths is not None and _A_LENGTH.fullmatch(str(scene)):
+            raise click.UsageError(f"--lengths are four: {ELSEWHERE}")
+        if (scene is None) == (lengths is None):
+            raise click.UsageError(
+                "give a scene file or --lengths D A B C, one of the two"
+            )
+        if scene is not None and omega is not None:
             raise click.UsageError(
                 "--omega goes with --lengths; a scene states its own omega_2"
             )
-        with given.open_scene(scene) as described:
-            yield described
-        return
-    from fourbar.mjcf import list_defaults, make_scene
+        if scene is not None:
+            with given.open_scene(scene) as described:
+                given.print_to(command(described, **options), out)
+            return
+        from fourbar.mjcf import list_defaults, make_scene
 
-    assert lengths is not None
-    speed = {}
-    if omega is not None:
-        speed["omega"] = given.read_number("--omega", omega, "rad/s")
-    with state_messages_in(units_of_length(lengths[0])):
-        made = make_scene(*given.read_lengths(lengths), **speed)
-    yield made
-    to_output = out == STANDARD_STREAM
-    for line in list_defaults(made):
-        click.echo(line, err=to_output)
+        assert lengths is not None
+        speed = {}
+        if omega is not None:
+            speed["omega"] = given.read_number("--omega", omega, "rad/s")
+        with state_messages_in(units_of_length(lengths[0])):
+            made = make_scene(*given.read_lengths(lengths), **speed)
+        given.print_to(command(made, **options), out)
+        for line in list_defaults(made):
+            click.echo(line, err=out == STANDARD_STREAM)
+
+    return written
 
 
 _without_loads_option = click.option(

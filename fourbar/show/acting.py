@@ -41,6 +41,21 @@ _BEYOND = (
 """Remark on a gas spring that goes on beyond an end of its stroke."""
 
 
+def list_notes(solution: Solution, units: Conversion) -> list[str]:
+    """List the remarks on what a scene states, and on what acts at its positions.
+
+    `units`: units of the numbers; one that is left out is the SI unit with a prefix.
+    """
+    scene = solution.scene
+    return [
+        *list_drawn_notes(scene, units),
+        *list_arm_notes(scene),
+        *_list_law_notes(scene, units),
+        *list_spring_notes(solution, units),
+        *_list_torsion_notes(solution, units),
+    ]
+
+
 def list_couple_notes(scene: Scene) -> list[str]:
     """Name where couples without a place enter their bars, in one line or none."""
     entries = [
@@ -95,7 +110,7 @@ def list_drawn_notes(scene: Scene, units: Conversion) -> list[str]:
     ]
 
 
-def list_law_notes(scene: Scene, units: Conversion) -> list[str]:
+def _list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     """Say what the ends of a table of angles assume, and what the other choice changes.
 
     A periodic table leaves no choice, nor does one with speeds or with three points.
@@ -122,20 +137,19 @@ def list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     ]
 
 
-def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> list[str]:
+def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
     """List where gas springs are beyond their stroke, and springs change their sense.
 
     A gas spring is taken to push on along the same line, and another one both to push
     and to pull: either may be a spring that does not exist.
-
-    `units`: units of the numbers; one that is left out is the SI unit with a prefix.
     """
+    scene = solution.scene
     springs = list_springs(scene)
     if not springs:
         return []
     course = None
     is_whole = solution.command_at is not None
-    if not is_whole and goes_on_between(scene, solution):
+    if not is_whole and goes_on_between(solution):
         is_whole = {*command(scene).places[[0, -1]]} == {*solution.at.places[[0, -1]]}
     if is_whole:
         course = MotionCourse(scene, "position", solution)
@@ -159,19 +173,16 @@ def list_spring_notes(scene: Scene, solution: Solution, units: Conversion) -> li
     return notes
 
 
-def list_torsion_notes(
-    scene: Scene,
-    solution: Solution,
-    units: Conversion,
-) -> list[str]:
+def _list_torsion_notes(solution: Solution, units: Conversion) -> list[str]:
     """Say which torsion springs are half a turn or more from rest, and where.
 
     Of one position it is said how far each is wound, and from what line.
     """
+    scene = solution.scene
     effects = scene.settled().effects
     torsions = [effect for effect in effects if isinstance(effect, Torsion)]
     springs = [row for effect in torsions for row in effect.springs]
-    notes = _list_wound(scene, solution, springs, units)
+    notes = _list_wound(solution, springs, units)
     if notes or len(solution) > 1 or not solution.assembled[0]:
         return notes
     write = partial(write_short, unit="rad", units=units, digits=POSITION_DIGITS)
@@ -191,7 +202,6 @@ def list_torsion_notes(
 
 
 def _list_wound(
-    scene: Scene,
     solution: Solution,
     springs: list[tuple[str, float, float, float]],
     units: Conversion,
@@ -201,7 +211,7 @@ def _list_wound(
     known = solution.status_code != CHANGE_POINT
     places = solution.at.places[known]
     for spring in springs if WOUND in solution.status_code else []:
-        alone = replace(scene, loads=(), effects=(Torsion((spring,)),))
+        alone = replace(solution.scene, loads=(), effects=(Torsion((spring,)),))
         wound = solve(alone, at=solution.at).status_code[known] == WOUND
         where = " and ".join(
             write_stretch(solution, stretch, units)

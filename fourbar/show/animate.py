@@ -89,10 +89,6 @@ def collect_page_data(
     `midway`: the page opens in the middle of a motion, not at its beginning.
     """
     data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
-    for columns in data["branches"].values():
-        for name, column in columns.items():
-            if isinstance(column, np.ndarray):
-                columns[name] = null_nan(column)
     encoded = _encode_pictures(scene, pictures)
     data["pictures"] = {str(bar): picture for bar, picture in encoded.items()}
     data["tolerances"] = data["toml"] = None
@@ -101,7 +97,8 @@ def collect_page_data(
         data["tolerances"] = collect_tolerances(scene, places)
     with suppress(InputError):  # a file has no form of what acts
         data["toml"] = dump(scene)
-    return data
+    plain: dict[str, Any] = null_nan(data)
+    return plain
 
 
 def collect_live_data(
@@ -136,10 +133,10 @@ def collect_live_data(
     bars = {str(number): linkage.bar(number) for number in MOVING_BARS}
     return {
         "type": classify(linkage).name,
-        "lengths": list(linkage.lengths),
+        "lengths": linkage.lengths,
         "theta_1": linkage.ground_angle,
         "unit": {"factor": factor, "name": unit},
-        "units": {unit: list(entry) for unit, entry in units.items()},
+        "units": units,
         "centres": {
             number: _split(bar.to_centre) if bar.mass > 0.0 else None
             for number, bar in bars.items()
@@ -189,19 +186,18 @@ def _collect_shown(
 ) -> dict[str, Any]:
     """Collect the motion that the scene makes, or branches over its command."""
     motion = scene.motion
-    over_time = is_over_time(scene)
-    made = solve(scene) if over_time else None
+    made = solve(scene) if is_over_time(scene) else None
     covered, place = list_sweep(scene) if made is None else (made.at, None)
     at = thin_out(covered)
     places = at.places
     commanded = covered.commanded
-    name = "time" if over_time else commanded
+    name = commanded if made is None else "time"
     start = None if place is None else int(np.argmin(np.abs(places - place)))
     if solved is not None and not np.array_equal(places, solved.at.places):
         solved = None
     branches = {}
     for sign in signs if name == "theta_2" else (motion.branch,):
-        if over_time:
+        if made is not None:
             solution = solve(scene, stage, at=at)
         elif solved is not None and sign == motion.branch:
             solution = solved
@@ -221,10 +217,10 @@ def _collect_shown(
     if made is not None:
         rate = _choose_rate(float(places[-1] - places[0]))
         pace = _describe_pace(made, rate, len(places))
-    has_one_speed = not over_time and not isinstance(motion.speed, np.ndarray)
+    has_one_speed = made is None and not isinstance(motion.speed, np.ndarray)
     return {
         "theta_2": null_nan(theta_2),
-        "time": places.tolist() if over_time else None,
+        "time": None if made is None else places.tolist(),
         "over": {
             "name": name,
             "commanded": commanded,

@@ -30,18 +30,10 @@ from fourbar.quantities import (
     Array,
 )
 from fourbar.scene.motion import BRANCH_NAMES
-from fourbar.show.acting import (
-    list_arm_notes,
-    list_couple_notes,
-    list_drawn_notes,
-    list_law_notes,
-    list_spring_notes,
-    list_torsion_notes,
-    write_stretch,
-)
+from fourbar.show.acting import list_couple_notes, list_notes, write_stretch
 from fourbar.show.change_point import has_growing_forces
 from fourbar.show.columns import explain_static
-from fourbar.show.driving import describe_drive, name_places
+from fourbar.show.driving import name_places
 from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
 from fourbar.show.motion_curves import MotionCurves, acts, find_drive_rounding
@@ -287,12 +279,10 @@ class SceneBlock(Facts):
         """
         at = self.solution.at
         angle = at.angle[self.solution.status_code == OK]
-        points = change_points(self.linkage, at.bar)
-        if not points:
-            return np.empty(0)
-        away = angle[:, None] - np.array(points)
-        away = np.abs(away - TURN * np.rint(away / TURN)).min(axis=1)
-        return np.asarray(away[away <= _BESIDE_CHANGE_POINT])
+        away = angle[:, None] - np.array(change_points(self.linkage, at.bar))
+        away = np.abs(away - TURN * np.rint(away / TURN))
+        nearest = np.min(away, axis=1, initial=np.inf)
+        return np.asarray(nearest[nearest <= _BESIDE_CHANGE_POINT])
 
     def _write_static_hint(self) -> Iterator[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
@@ -585,7 +575,10 @@ class SceneBlock(Facts):
             head = f"drive on the {BAR_NAMES[scene.drive_bar]}"
         else:
             kind = "cylinder" if scene.drive.has_stroke else "force"
-            head = f"{kind} {describe_drive(scene).removeprefix('along a line ')}"
+            numbers = [place.bar for _, place in scene.drive.ends]
+            bars = [f"bar {number} ({BAR_NAMES[number]})" for number in numbers]
+            way = "from" if len(bars) > 1 else "at a point of"
+            head = f"{kind} {way} {' to '.join(bars)}"
         if motion.speed is None:
             return head if motion.law is None else f"{head}, by a law over time"
         _, speeds, accelerations = self.solution.at.stated
@@ -745,7 +738,6 @@ class SceneBlock(Facts):
 
     def _write_remarks(self) -> Iterator[str]:
         """Write where pin forces jump, and what rounding does."""
-        scene = self.scene
         solution = self.solution
         passes = self.has_forces and solution.change_points
         if passes and has_growing_forces(solution):
@@ -765,11 +757,7 @@ class SceneBlock(Facts):
                 "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()
-        yield from list_drawn_notes(scene, self.units)
-        yield from list_arm_notes(scene)
-        yield from list_law_notes(scene, self.units)
-        yield from list_spring_notes(scene, solution, self.units)
-        yield from list_torsion_notes(scene, solution, self.units)
+        yield from list_notes(solution, self.units)
         if self.drive is not None and self._is_balanced():
             yield f"the {self.drive.name} is zero within rounding"
         elif self.error is not None:
@@ -792,15 +780,9 @@ class SceneBlock(Facts):
         drive = self.drive
         if drive is None or drive.error is None or solution.drive_condition is None:
             return
-        # of those that matter: one that passes through zero has no digits, and needs
-        # none
-        sizes = drive.sizes
-        with np.errstate(invalid="ignore"):
-            reference = np.maximum(sizes, np.nanmedian(sizes))
-            reference[reference == 0.0] = np.nan
-            share = drive.error / reference
-        if not self._without_rounding(float(np.nanmax(sizes, initial=0.0))):
+        if not self._without_rounding(float(np.nanmax(drive.sizes, initial=0.0))):
             return  # nothing has digits to lose
+        share = self.relate_errors(drive.error, drive.sizes)
         if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
             return
         worst = int(np.nanargmax(share))

@@ -51,12 +51,12 @@ def find_limits(solution: Solution) -> tuple[Solution, str]:
             "on the change point pin forces have no value: the motion begins, ends or"
             " stands still there, and has one side alone"
         )
-    bounded = [np.isfinite(limit).all() for limit in limits.values()]
+    bounded = np.isfinite(limits)
     said = "on the change point no pin force has a limit"
-    if any(bounded):
+    if bounded.any():
         said = "on the change point: the limits from both sides"
-        said += "" if all(bounded) else "; - has none"
-    forces: Any = {name: limit[None] for name, limit in limits.items()}
+        said += "" if bounded.all() else "; - has none"
+    forces: Any = dict(zip(PIN_FORCES, limits[:, None], strict=True))
     return replace(solution, **forces), said
 
 
@@ -73,7 +73,7 @@ def has_growing_forces(solution: Solution) -> bool:
     for instant in solution.change_points or ():
         at = command_of_run(np.array([0.0, instant])).part(slice(1, None))
         limits = _extrapolate_forces(solution.scene, at, command_of_run)
-        if limits is not None and np.isnan([*limits.values()]).any():
+        if limits is not None and np.isnan(limits).any():
             return True
     return False
 
@@ -113,10 +113,10 @@ def _list_places(
 
 def _extrapolate_forces(
     scene: Scene, at: Command, command_of_run: Callable[[Array], Command]
-) -> dict[str, Array] | None:
+) -> Array | None:
     """Extrapolate the pin forces to a change point from positions on both sides.
 
-    Returned are vectors, (2,), NaN without a limit; None without a side.
+    Returned are their vectors, (4, 2), NaN without a limit; None without a side.
 
     `command_of_run`: command of a release at other times, which rise from 0.
     """
@@ -134,4 +134,4 @@ def _extrapolate_forces(
     limits = extrapolations[:, :, 0].mean(axis=1)
     limits[np.abs(limits) <= ZERO_LIMIT * size] = 0.0
     limits[~(distance <= SAME_LIMIT * size)] = np.nan
-    return dict(zip(PIN_FORCES, limits, strict=True))
+    return np.asarray(limits)

@@ -7,7 +7,6 @@ place with two coordinates, `omega_4/omega_2` a ratio, `theta_3-theta_2` a diffe
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -20,7 +19,8 @@ from fourbar.errors import (
     names_other_mechanism,
 )
 from fourbar.quantities import STAGE_OF, Array, find_derived
-from fourbar.scene import Command, ReleaseOrigin, Scene, command_at, find_signs
+from fourbar.scene import Scene
+from fourbar.scene.scene import LimitOrigin
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.solution import (
     Conversion,
@@ -95,14 +95,23 @@ def choose_columns(solution: Solution, names: str) -> list[Column]:
 
 def read_column(solution: Solution, name: str) -> Column:
     """Read one column by its name; InputError as of `choose_columns`."""
-    for parts in _split_difference(solution, name):
-        return _subtract(name, *(read_column(solution, part) for part in parts))
-    if _is_number(solution, name) or "/" not in name:
+    numbers = _list_numbers(solution)
+    if name in numbers:
         return _read_number(solution, name)
-    above, _, below = (part.strip() for part in name.partition("/"))
-    if _is_force_along_path(solution, above) and _is_force_along_path(solution, below):
+    velocities = {f"{_ALONG}{point}": f"v_{point}" for point in solution.points}
+    # the sign of a difference may also stand in the name of a point
+    words = name.split("-")
+    for count in range(1, len(words)):
+        parts = ["-".join(words[:count]), "-".join(words[count:])]
+        named = map(str.strip, "/".join(parts).split("/"))
+        if {*numbers, *velocities}.issuperset(named):
+            return _subtract(name, *(read_column(solution, x.strip()) for x in parts))
+    above, divides, below = map(str.strip, name.partition("/"))
+    if not divides:
+        raise _refuse_name(solution, name)
+    if above in velocities and below in velocities:
         # by virtual work the forces are as the speeds, the other way round
-        above, below = (f"v_{part.removeprefix(_ALONG)}" for part in (below, above))
+        above, below = velocities[below], velocities[above]
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(solution)
@@ -114,23 +123,18 @@ def read_column(solution: Solution, name: str) -> Column:
     return Column(name, numerator.unit, ratio, denominator.unit)
 
 
-def _split_difference(solution: Solution, name: str) -> Iterator[tuple[str, str]]:
-    """Yield the columns of which a name is the difference.
+def _list_numbers(solution: Solution) -> dict[str, tuple[str, int | None]]:
+    """List the numbers of each position: the quantity of each, and its component.
 
-    The sign of a difference may also stand in the name of a point.
+    The component is None for a quantity itself, of a vector its size.
     """
-    if _is_number(solution, name):
-        return
-    words = name.split("-")
-    for count in range(1, len(words)):
-        first = "-".join(words[:count])
-        second = "-".join(words[count:])
-        if all(
-            _is_number(solution, number) or _is_force_along_path(solution, number)
-            for part in (first, second)
-            for number in map(str.strip, part.split("/"))
-        ):
-            yield first.strip(), second.strip()
+    numbers: dict[str, tuple[str, int | None]] = {"time": ("time", None)}
+    for name in list_column_quantities(solution):
+        numbers[name] = name, None
+        if not is_scalar(name):
+            for ending, axis in COLUMN_AXES.items():
+                numbers[f"{name}{ending}"] = name, axis
+    return numbers
 
 
 def _subtract(name: str, first: Column, second: Column) -> Column:
@@ -164,9 +168,10 @@ def _read_number(solution: Solution, name: str) -> Column:
             none = "passed at no one speed, without a law, the positions have no time"
             raise InputError("--columns", name, none)
         return Column(name, "s", values)
-    stem, axis = _split_axis(name)
-    if not _is_number(solution, name):
+    numbers = _list_numbers(solution)
+    if name not in numbers:
         raise _refuse_name(solution, name)
+    stem, axis = numbers[name]
     values = derive(solution, stem)
     if values is None:
         raise _ask_for_speed(solution.scene, name)
@@ -187,12 +192,13 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
     with_speed = solution
     if solution.at.speed is None:
         with_speed = solve(replace(scene, motion=scene.motion.replace(speed=0.0)))
-    if names_other_mechanism(_split_axis(name)[0]):
+    if names_other_mechanism(re.sub("_[xy]$", "", name)):
         return InputError("--columns", name, f"unknown; {ELSEWHERE}")
-    if _is_number(with_speed, name):
+    numbers = _list_numbers(with_speed)
+    if name in numbers:
         return _ask_for_speed(scene, name)
     reaction = re.sub(r"^F(\d)(\d)", r"F\2\1", name)
-    if reaction != name and _is_number(with_speed, reaction):
+    if reaction in numbers:
         return InputError("--columns", name, f"is the reaction of {reaction}: minus it")
     allowed = list_allowed(name, ["time", *list_column_quantities(with_speed)])
     return InputError(
@@ -201,21 +207,6 @@ def _refuse_name(solution: Solution, name: str) -> InputError:
         f"{allowed}; F12_x is a component, omega_4/omega_2 a ratio, theta_3-theta_2 a"
         " difference, F_P/F_Q a ratio of forces along paths",
     )
-
-
-def _split_axis(name: str) -> tuple[str, int | None]:
-    """Split a name into that of a quantity and its component, which may be none."""
-    axis = COLUMN_AXES.get(name[-2:])
-    return (name, None) if axis is None else (name[:-2], axis)
-
-
-def _is_number(solution: Solution, name: str) -> bool:
-    """Return True for the time, a quantity or a component of one."""
-    stem, axis = _split_axis(name)
-    if name == "time":
-        return True
-    known = stem in list_column_quantities(solution)
-    return known and (axis is None or not is_scalar(stem))
 
 
 def list_column_quantities(solution: Solution) -> list[str]:
@@ -238,13 +229,7 @@ def _is_place(solution: Solution, name: str) -> bool:
 
 def _is_velocity(name: str) -> bool:
     """Return True for a quantity that grows with the speed of the command."""
-    stem, _ = _split_axis(name)
-    return stem.startswith("v_") or STAGE_OF.get(stem) == "velocity"
-
-
-def _is_force_along_path(solution: Solution, name: str) -> bool:
-    """Return True for "F_handle": the force along the path of a point of the scene."""
-    return name.startswith(_ALONG) and name.removeprefix(_ALONG) in solution.points
+    return name.startswith("v_") or STAGE_OF.get(name) == "velocity"
 
 
 def explain_static(scene: Scene) -> str:
@@ -265,17 +250,11 @@ def _ask_for_speed(scene: Scene, name: str) -> InputError:
 
 
 def _solve_at_unit_speed(solution: Solution) -> Solution:
-    """Solve the same positions with speed 1 of the command.
+    """Solve the same positions with speed 1 of the bar that is commanded.
 
     Ratios of speeds exist at rest too.
     """
-    scene = solution.scene
-    if solution.at.moves_stroke:
-        motion = scene.motion.replace(speed=1.0, acceleration=0.0)
-        at = command_at(replace(scene, motion=motion), solution.at.stated[0])
-    elif isinstance(solution.at.origin, ReleaseOrigin):
-        assembly = find_signs(scene.linkage, solution.theta_2, solution.branch)
-        at = Command(solution.theta_2, assembly, 1.0, 0.0)
-    else:
-        at = solution.at._replace(speed=1.0, acceleration=0.0)
-    return solve(scene, "velocity", at=at)
+    at = solution.at._replace(speed=1.0, acceleration=0.0)
+    if not isinstance(at.origin, LimitOrigin):
+        at = at._replace(origin=None)
+    return solve(solution.scene, "velocity", at=at)

@@ -5,9 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.formulas.path import count_turns
-from fourbar.linkage import BAR_NAMES
 from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
-from fourbar.scene import Scene
 from fourbar.show.shown_units import drop_rounding
 from fourbar.solution import Solution
 
@@ -91,20 +89,6 @@ def name_places(solution: Solution) -> tuple[str, str]:
     if solution.time is not None:
         return "t", "s"
     return solution.commanded, solution.at.unit
-
-
-def describe_drive(scene: Scene) -> str:
-    """Say what is driven."""
-    if scene.drive is not None:
-        start, *others = (place.bar for _, place in scene.drive.ends)
-        if not others:
-            return f"at a point of bar {start} ({BAR_NAMES[start]})"
-        end = others[0]
-        return (
-            f"along a line from bar {start} ({BAR_NAMES[start]}) to bar {end}"
-            f" ({BAR_NAMES[end]})"
-        )
-    return f"bar {scene.drive_bar} ({BAR_NAMES[scene.drive_bar]})"
 
 
 def is_once_round(solution: Solution) -> bool:

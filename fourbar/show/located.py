@@ -100,11 +100,6 @@ class _LocatedSearch:
             self.values[self.course.solution[bar] > most] = np.nan
         self.is_extreme = np.zeros(len(self.values), dtype=bool)
 
-    def _read(self, places: Array) -> Array:
-        """Return the column at places in an array of any shape."""
-        solution = self.course.solve(np.ravel(places))
-        return self._read_column(solution).reshape(np.shape(places))
-
     def _read_column(self, solution: Solution) -> Array:
         """Return the column at positions, NaN where the linkage does not assemble."""
         values = read_column(solution, self.name).values
@@ -115,7 +110,8 @@ class _LocatedSearch:
 
         Angles are counted modulo a turn.
         """
-        return self._wrap(self._read(places) - value)
+        read = self._read_column(self.course.solve(np.ravel(places)))
+        return self._wrap(read.reshape(np.shape(places)) - value)
 
     def _wrap(self, gaps: Array) -> Array:
         return np.angle(np.exp(1j * gaps)) if self.unit == "rad" else gaps

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fourbar.evaluation.case import POSITIONS_OF_A_BLOCK, compute_shown_state
 from fourbar.formulas.mobility import TURN, find_circuit_where
 from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
-from fourbar.quantities import NO_LEVER, NO_TORQUE, PIN_FORCES, RATES, Array
+from fourbar.quantities import NO_LEVER, NO_TORQUE, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import (
     find_starts,
@@ -28,6 +28,8 @@ from fourbar.show.driving import (
 from fourbar.show.panels import (
     DEEP,
     SHALLOW,
+    Curves,
+    PanelCurve,
     Panels,
     Peak,
     Wanted,
@@ -65,8 +67,6 @@ _HALF_A_TURN = 1e-6
 """Part by which half a turn between two ranges of angles may be more, and is no turn.
 An end in its last digits leaves some 1e-8.
 """
-_Curves = dict[str, tuple[Array, Wanted]]
-"""Curves by name, with what is asked of each."""
 _Named = list[tuple[float, str]]
 """Places with the name of what happens there."""
 
@@ -119,14 +119,11 @@ class MotionCurves:
         panels = self.panels
         if not panels.located or self.solution.F12 is None:
             return self.solution
-        drive = read_drive_demand(self.solution)
-        names = [drive.keys.value, "power", "speed", *PIN_FORCES]
-        peaks = [peak.place for name in names if (peak := self.find_peak(name))]
+        peaks = [peak.place for peak in map(self.find_peak, panels.curves) if peak]
         away = _BESIDE_A_BREAK * panels.length
         stated = self.solution.at.places
         found = np.concatenate([peaks, self.breaks - away, self.breaks + away])
-        found = found[(found >= stated.min()) & (found <= stated.max())]
-        places = np.union1d(stated, found)
+        places = np.union1d(stated, np.clip(found, stated.min(), stated.max()))
         if panels.start[0] > panels.stop[-1]:
             places = places[::-1]
         return self.solve_at(places)
@@ -175,11 +172,7 @@ class MotionCurves:
             begun = _BEGINNING * np.where(senses == 0.0, sense, senses)
             stated: Any = at.speed
             at = at._replace(speed=np.where(stated == 0.0, begun, stated))
-        begins = solve(scene, at=at)
-        if scene.motion.law is not None:  # it rests all the time
-            panels = _take_positions(begins, _list_curves)
-            return replace(self, solution=begins, panels=panels)
-        return describe_motion(begins)
+        return describe_motion(solve(scene, at=at))
 
     @cached_property
     def start(self) -> Peak | None:
@@ -269,36 +262,33 @@ def describe_motion(solution: Solution) -> MotionCurves:
 def _fit_curves(solution: Solution) -> MotionCurves:
     """Fit the curves of a motion, or take those of its positions."""
     scene = solution.scene
-    if not goes_on_between(scene, solution):
+    if not goes_on_between(solution):
         extremes = solution
         if solution.with_extremes is not None:
             extremes = solve(scene, "position", at=solution.with_extremes)
         positions = _take_positions(extremes, _list_position_curves)
         panels = _take_positions(solution, _list_curves)
-        _mark_poles(scene, solution, panels)
+        _mark_poles(solution, panels)
         return MotionCurves(scene, solution, positions, panels, [], [], np.zeros(0))
-    exact, even = _cut(scene, solution)
-    zeros, rests = _locate_breaks(scene, solution, _join_edges(exact, even))
-    corners = exact[: 0 if scene.motion.law is None else None]
-    breaks = np.unique([*corners, *(place for place, _ in zeros)])
-    exact = np.unique(np.concatenate([exact, breaks]))
+    exact, even = _cut(solution)
+    zeros, rests = _locate_breaks(solution, _join_edges(exact, even))
+    places = [place for place, _ in zeros]
+    exact = np.union1d(exact, places)
+    breaks = np.unique(places) if scene.motion.law is None else exact
     edges = _join_edges(exact, even)
 
     def fit(
-        list_curves: Callable[[Solution], _Curves], stage: str, most_halvings: int
+        list_curves: Callable[[Solution], Curves], stage: str, most_halvings: int
     ) -> Panels:
-        def compute(places: Array) -> dict[str, Array]:
-            there = solve(scene, stage, at=command_at(scene, places))
-            return _take_values(list_curves(there))
+        def compute(places: Array) -> Curves:
+            return list_curves(solve(scene, stage, at=command_at(scene, places)))
 
-        at_edges = solve(scene, stage, at=command_at(scene, edges))
-        wanted = {name: kind for name, (_, kind) in list_curves(at_edges).items()}
         points = exact
         if scene.motion.law is not None:
             # what accelerates from rest bears what stands beside that instant
-            begins = edges[find_starts(at_edges) != 0.0]
-            points = exact[~np.isin(exact, begins)]
-        return fit_panels(compute, edges, wanted, most_halvings, points)
+            at_edges = solve(scene, stage, at=command_at(scene, edges))
+            points = exact[~np.isin(exact, edges[find_starts(at_edges) != 0.0])]
+        return fit_panels(compute, edges, most_halvings, points)
 
     positions = fit(_list_position_curves, "position", DEEP)
     for bar in MOVING_BARS:
@@ -315,21 +305,27 @@ def _fit_curves(solution: Solution) -> MotionCurves:
 
 
 def _take_positions(
-    solution: Solution, list_curves: Callable[[Solution], _Curves]
+    solution: Solution, list_curves: Callable[[Solution], Curves]
 ) -> Panels:
     """Take the curves at positions alone, as panels of one node each."""
     share = np.ones(len(solution))
+    unknown = np.full(len(solution), np.inf)
+    curves = {
+        name: PanelCurve(values.reshape(len(solution), 1, -1), unknown, [])
+        for name, (values, _) in list_curves(solution).items()
+    }
     if is_once_round(solution):
         share[-1] = 0.0  # the first position again
-    curves = _take_values(list_curves(solution))
-    return Panels.of_positions(solution.at.places, curves, share)
+    places = solution.at.places
+    return Panels(places, places, share, curves, located=False)
 
 
-def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
+def _mark_poles(solution: Solution, panels: Panels) -> None:
     """Mark listed positions without a lever, beside which a curve grows.
 
     A curve that does not double at a quarter of the distance stays bounded there.
     """
+    scene = solution.scene
     rows = np.flatnonzero(np.isin(solution.status_code, (NO_LEVER, NO_TORQUE)))
     listed = scene.motion.free is None and not solution.at.moves_stroke
     if solution.F12 is None or not listed or not rows.size:
@@ -345,19 +341,17 @@ def _mark_poles(scene: Scene, solution: Solution, panels: Panels) -> None:
         curve.poles = rows[(sizes[2:] > 2.0 * sizes[:2]).any(axis=0)].tolist()
 
 
-def goes_on_between(scene: Scene, solution: Solution) -> bool:
+def goes_on_between(solution: Solution) -> bool:
     """Return True if the scene says what happens between the positions."""
     at = solution.at
-    motion = scene.motion
-    listed = isinstance(motion.angle, np.ndarray)
-    if motion.free is not None or listed or len(solution) < 2:
-        return False
-    if at.commanded != motion.commanded:
+    motion = solution.scene.motion
+    listed = motion.free is not None or isinstance(motion.angle, np.ndarray)
+    if listed or len(solution) < 2 or at.commanded != motion.commanded:
         return False
     steps = np.diff(at.places)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         return False
-    stated = command_at(scene, at.places)
+    stated = command_at(solution.scene, at.places)
     names = ["angle", "branch"]
     if at.speed is not None:
         names += ["speed", "acceleration"]
@@ -368,7 +362,7 @@ def goes_on_between(scene: Scene, solution: Solution) -> bool:
     )
 
 
-def _cut(scene: Scene, solution: Solution) -> tuple[Array, Array]:
+def _cut(solution: Solution) -> tuple[Array, Array]:
     """Return the ends of the parts of a motion, and of the first panels besides.
 
     The parts are those of a law; the latter are in the order of the motion.
@@ -378,11 +372,12 @@ def _cut(scene: Scene, solution: Solution) -> tuple[Array, Array]:
     count = np.clip(np.ceil(turned), 1, _MOST_FIRST_PANELS // _PANELS_OF_A_TURN)
     even = np.linspace(places[0], places[-1], int(count) * _PANELS_OF_A_TURN + 1)
     ends = even[[0, -1]]
-    if scene.motion.law is None:
+    law = solution.scene.motion.law
+    if law is None:
         return ends, even
-    times = np.array(scene.motion.law.time)
+    times = np.array(law.time)
     inside = (times > ends[0]) & (times < ends[1])
-    return np.concatenate([ends, times[inside]]), even
+    return np.append(ends, times[inside]), even
 
 
 def _join_edges(exact: Array, others: Array) -> Array:
@@ -393,38 +388,35 @@ def _join_edges(exact: Array, others: Array) -> Array:
     return edges if others[-1] > others[0] else edges[::-1]
 
 
-def _locate_breaks(
-    scene: Scene,
-    solution: Solution,
-    edges: Array,
-) -> tuple[_Named, _Named]:
+def _locate_breaks(solution: Solution, edges: Array) -> tuple[_Named, _Named]:
     """Locate where forces jump or bend, with the names of what breaks there.
 
     The second places are those at which a name comes to rest or leaves it.
     """
     if solution.F12 is None:
         return [], []
-    settled = scene.settled()
+    scene = solution.scene.settled()
 
-    def compute(places: Array) -> dict[str, Array]:
-        state = compute_shown_state(settled, command_at(scene, places))
+    def compute(places: Array) -> Curves:
+        state = compute_shown_state(scene, command_at(scene, places))
         breaks = dict[str, Any]()
-        for term in (*settled.loads, *settled.effects):
+        for term in (*scene.loads, *scene.effects):
             breaks |= term.breaks(state)
-        return {name: values + np.zeros(len(places)) for name, values in breaks.items()}
+        asked = Wanted(zeros=True)
+        none = np.zeros(len(places))
+        return {name: (values + none, asked) for name, values in breaks.items()}
 
-    names = compute(edges[:1])
-    if not names:
+    if not compute(edges[:1]):
         return [], []
-    panels = fit_panels(compute, edges, dict.fromkeys(names, Wanted(zeros=True)))
+    panels = fit_panels(compute, edges)
     width = _SAME_EDGE * panels.length
     breaks: _Named = []
     rests: _Named = []
-    for name in names:
+    for name, curve in panels.curves.items():
         zeros = panels.find_zeros(name)
         away = np.abs(zeros[:, None] - edges[[0, -1]])
         places = zeros[away.min(axis=1) > width].tolist()
-        first, last = panels.curves[name].values[[0, -1], [0, -1], 0]
+        first, last = curve.values[[0, -1], [0, -1], 0]
         # what lies at both ends of a turn is passed like any other position
         if is_once_round(solution) and first * last < 0.0:
             places.append(float(edges[0]))
@@ -434,11 +426,7 @@ def _locate_breaks(
     return sorted(breaks, reverse=backwards), sorted(rests, reverse=backwards)
 
 
-def _take_values(curves: _Curves) -> dict[str, Array]:
-    return {name: values for name, (values, _) in curves.items()}
-
-
-def _list_position_curves(solution: Solution) -> _Curves:
+def _list_position_curves(solution: Solution) -> Curves:
     """List the curves of the positions alone, by name.
 
     A commanded angle has a value where the linkage does not assemble, too.
@@ -454,13 +442,13 @@ def _list_position_curves(solution: Solution) -> _Curves:
     return curves
 
 
-def _list_curves(solution: Solution) -> _Curves:
+def _list_curves(solution: Solution) -> Curves:
     """List the curves of loads, or where nothing acts of rates, by name.
 
     Commanded rates end, as all others do, where the linkage ceases to assemble.
     """
     scene = solution.scene
-    curves: _Curves = {}
+    curves: Curves = {}
     if solution.omega_4 is not None and not (acts(scene) and solution.F12 is not None):
         for name in RATES:
             curves[name] = where_assembled(solution, getattr(solution, name)), Wanted()

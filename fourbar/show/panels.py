@@ -7,14 +7,14 @@ narrow to matter. Towards a pole the values grow with each halving: such a curve
 largest value and no integral.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Legendre
-from numpy.polynomial.legendre import leggauss, legval, legvander
+from numpy.polynomial.legendre import leggauss, legint, legval, legvander
 from numpy.typing import NDArray
 
 from fourbar.quantities import Array
@@ -86,9 +86,6 @@ _EVALUATED = np.concatenate((_CHECKED[:1], _X, _CHECKED[1:]))
 UPPER, LOWER = np.positive, np.negative
 """Ranks of the values of a curve by which the largest, or the least, is its peak."""
 
-ComputeCurves = Callable[[Array], dict[str, Array]]
-"""Compute curves at places (n,), by name, each (n,) or (n, k): k components."""
-
 
 class Peak(NamedTuple):
     """Largest or smallest value of a quantity, and where it is taken."""
@@ -111,6 +108,12 @@ class Wanted(NamedTuple):
     """True if both ends of its range are wanted."""
     zeros: bool = False
     """True if its zeros are wanted, and nothing else."""
+
+
+Curves = dict[str, tuple[Array, Wanted]]
+"""Values of curves at n places by name, each (n,) or (n, k): k components. What is
+asked of each stands beside it.
+"""
 
 
 @dataclass
@@ -155,20 +158,6 @@ class Panels:
     located: bool = True
     """False if the panels are single positions."""
 
-    @classmethod
-    def of_positions(
-        cls,
-        places: Array,
-        curves: Mapping[str, Array],
-        share: Array,
-    ) -> "Panels":
-        """Take positions for panels of one node each, with curves (n,) or (n, k)."""
-        n = len(places)
-        single = {}
-        for name, values in curves.items():
-            single[name] = PanelCurve(values.reshape(n, 1, -1), np.full(n, np.inf), [])
-        return cls(places, places, share, single, located=False)
-
     def leave_out(self, panels: NDArray[np.bool_]) -> "Panels":
         """Return the curves without values in some of the panels, (p,)."""
         curves = {}
@@ -198,39 +187,33 @@ class Panels:
         """List the places at which a curve grows without bound."""
         return [float(self.start[panel]) for panel in self.curves[name].poles]
 
-    def _average(self, of_nodes: Array) -> float:
-        """Return the mean over the motion of values at the nodes, where there are."""
-        means = of_nodes @ (0.5 * _WEIGHTS if self.located else np.ones(1))
-        known = np.isfinite(means)
-        return float(means[known] @ self.share[known] / self.share[known].sum())
-
     def find_rms(self, name: str) -> float:
-        """Return the root of the mean square of a curve over the motion."""
+        """Return the root of the mean square of a curve over the motion.
+
+        The mean is that of the panels in which it has values.
+        """
         sizes = self.curves[name].sizes
         scale = np.nanmax(np.abs(sizes)) or 1.0
-        return float(scale * np.sqrt(self._average(np.square(sizes / scale))))
-
-    def integrate(self, name: str) -> float:
-        """Return the integral of a curve over the motion."""
-        return self._average(self.curves[name].sizes) * self.length
+        weights = 0.5 * _WEIGHTS if self.located else np.ones(1)
+        means = np.square(sizes / scale) @ weights
+        known = np.isfinite(means)
+        mean = means[known] @ self.share[known] / self.share[known].sum()
+        return float(scale * np.sqrt(mean))
 
     def accumulate(self, name: str, level: float = 0.0) -> Array:
         """Integrate a curve less a level up to where the integral may turn back.
 
         Such places are the ends of the panels, and the zeros of the difference within
-        them. The first integral is 0.
+        them. The first integral is 0, and the last that over the whole motion.
         """
         series = np.nan_to_num(self.curves[name].series[..., 0])
         series[:, 0] -= level
-        widths = self.share * self.length
-        totals = np.cumsum(widths * series[:, 0])
+        rising = legint(series.T, lbnd=-1.0).T
         integrals = [np.zeros(1)]
-        for panel in range(len(totals)):
-            if (zeros := _find_panel_zeros(series[panel])).size:
-                until = Legendre(series[panel]).integ(lbnd=-1.0)(zeros)
-                begin = totals[panel] - widths[panel] * series[panel, 0]
-                integrals.append(begin + 0.5 * widths[panel] * until)
-            integrals.append(totals[panel : panel + 1])
+        for panel, half in enumerate(0.5 * self.share * self.length):
+            stops = np.append(_find_panel_zeros(series[panel]), 1.0)
+            until = half * legval(stops, rising[panel])
+            integrals.append(integrals[-1][-1] + until)
         return np.concatenate(integrals)
 
     def find_zeros(self, name: str) -> Array:
@@ -361,8 +344,6 @@ class _Fit(NamedTuple):
     """Values of scalars, or sizes of vectors, at the nodes and beside the ends,
     (p, NODES + 2, k); NaN where they are missing.
     """
-    is_open: NDArray[np.bool_]
-    """True where no halving settled a curve, (p, k)."""
 
     def part(self, rows: Any) -> "_Fit":
         """Return some of the panels."""
@@ -370,84 +351,74 @@ class _Fit(NamedTuple):
 
 
 def fit_panels(
-    compute: ComputeCurves,
+    compute: Callable[[Array], Curves],
     edges: Array,
-    wanted: Mapping[str, Wanted],
     most_halvings: int = DEEP,
-    points: Array | None = None,
+    points: Any = (),
 ) -> Panels:
     """Halve panels until each curve is settled.
 
     Parameters
     ----------
-    compute : curves to represent.
+    compute : curves to represent. What is asked of them is that at the edges.
     edges : ends of the first panels, (p + 1,), in the order of the motion.
-    wanted : by name of a curve, what is asked of it.
     most_halvings : number of rounds after which a curve is taken as it is.
     points : ends of panels that become panels of no width besides. A curve that jumps
         there may have a value of its own.
     """
-    fit, first = _fit_panels(compute, wanted, edges[:-1], edges[1:])
+    wanted = {name: asked for name, (_, asked) in compute(edges).items()}
+    start, stop = (np.append(points, ends) for ends in (edges[:-1], edges[1:]))
+    fit, first = _fit_panels(compute, start, stop)
     # a node next to a pole does not change the size of a curve
-    medians = np.median(np.nan_to_num(np.abs(fit.sizes[:, 1:-1])), axis=1)
+    sizes = np.nan_to_num(np.abs(fit.sizes[len(points) :, 1:-1]))
+    medians = np.median(sizes, axis=1)
     scale = medians.max(axis=0)
     scale[scale == 0.0] = 1.0
     usual = scale * np.sqrt(np.square(medians / scale).mean(axis=0))
     whole = edges[-1] - edges[0]
-    settled: list[_Fit] = []
     for halvings in range(most_halvings + 1):
-        share = (fit.stop - fit.start) / whole
-        others = [part.sizes for part in settled]
-        is_open = _find_open(fit, others, share, usual, wanted)
         noise = _NOISE * 2.0**halvings * np.fmax.reduce(np.abs(fit.sizes), axis=1)
+        is_open = _find_open(fit, whole, usual, [*wanted.values()])
         is_open &= ~(fit.error <= noise)
         halved = is_open.any(axis=1)
         if halvings == most_halvings or not 0 < halved.sum() <= _MOST_OPEN:
             break
-        settled.append(fit.part(~halved))
         middle = 0.5 * (fit.start + fit.stop)[halved]
         start = np.concatenate((fit.start[halved], middle))
         stop = np.concatenate((middle, fit.stop[halved]))
-        fit, first = _fit_panels(compute, wanted, start, stop)
-    settled.append(fit._replace(is_open=is_open))
-    if points is not None:
-        of_points, _ = _fit_panels(compute, wanted, points, points)
-        settled.insert(0, of_points)
-    fit = _Fit(*map(np.concatenate, zip(*settled, strict=True)))
-    fit = fit.part(np.argsort(fit.start * np.sign(whole), kind="stable"))
+        halves, _ = _fit_panels(compute, start, stop)
+        both = zip(fit.part(~halved), halves, strict=True)
+        fit = _Fit(*map(np.concatenate, both))
+    order = np.argsort(fit.start * np.sign(whole), kind="stable")
+    fit = fit.part(order)
     width = fit.stop - fit.start
     (panels,) = np.nonzero(width)
+    is_open = is_open[order][panels]
     values = np.split(fit.values, first[1:], axis=-1)
     curves = {}
     for k, name in enumerate(wanted):
-        sizes = fit.sizes[panels, 1:-1, k]
-        poles = panels[_find_poles(sizes, fit.is_open[panels, k])]
+        poles = panels[_find_poles(fit.sizes[panels, 1:-1, k], is_open[:, k])]
         curves[name] = PanelCurve(values[k], fit.error[:, k], poles.tolist())
     return Panels(fit.start, fit.stop, width / width.sum(), curves)
 
 
 def _find_open(
-    fit: _Fit,
-    others: list[Array],
-    share: Array,
-    usual: Array,
-    wanted: Mapping[str, Wanted],
+    fit: _Fit, whole: float, usual: Array, wanted: list[Wanted]
 ) -> NDArray[np.bool_]:
-    """Mark the panels that are halved, (p, k): for extremes, zeros or integrals.
-
-    `others`: sizes of the panels that are settled.
-    """
-    rounding, *asked = np.array([*wanted.values()]).T
+    """Mark the panels that are halved, (p, k): for extremes, zeros or integrals."""
+    rounding, *asked = np.array(wanted).T
     integrated, ranged, zeros = np.array(asked, dtype=bool)
-    sizes = np.concatenate([*others, fit.sizes])
-    most: Array = np.fmax.reduce(sizes, axis=(0, 1))
-    least: Array = np.fmin.reduce(sizes, axis=(0, 1))
+    highest: Array = np.fmax.reduce(fit.sizes, axis=1)
+    lowest: Array = np.fmin.reduce(fit.sizes, axis=1)
+    most: Array = np.fmax.reduce(highest)
+    least: Array = np.fmin.reduce(lowest)
     scale = np.maximum(np.abs(most), np.abs(least))
-    highest: Array = np.fmax.reduce(fit.sizes, axis=1) + fit.error
-    lowest: Array = np.fmin.reduce(fit.sizes, axis=1) - fit.error
+    highest += fit.error
+    lowest -= fit.error
     may_vanish = (lowest <= 0.0) & (highest >= 0.0) & ~(fit.error <= ZERO * scale)
     may_exceed = (highest >= most) | (lowest <= np.where(ranged, least, -scale))
     is_open = may_exceed & ~(fit.error <= EXTREME_ERROR * scale + rounding)
+    share = (fit.stop - fit.start) / whole
     of_motion = share[:, None] * fit.error
     is_open |= integrated & ~(of_motion <= SETTLED * usual + rounding)
     return np.where(zeros, may_vanish, is_open)
@@ -479,7 +450,7 @@ def _find_poles(sizes: Array, unsettled: NDArray[np.bool_]) -> list[int]:
 
 
 def _fit_panels(
-    compute: ComputeCurves, names: Iterable[str], start: Array, stop: Array
+    compute: Callable[[Array], Curves], start: Array, stop: Array
 ) -> tuple[_Fit, NDArray[np.intp]]:
     """Fit the polynomials of panels to curves, and estimate their errors.
 
@@ -488,10 +459,9 @@ def _fit_panels(
     too, (k,).
     """
     places = start[:, None] + 0.5 * (stop - start)[:, None] * (1.0 + _EVALUATED)
-    found = compute(places.ravel())
-    columns = [found[name].reshape(*places.shape, -1) for name in names]
-    counts = [column.shape[-1] for column in columns]
-    first = np.cumsum([0, *counts[:-1]])
+    found = compute(places.ravel()).values()
+    columns = [values.reshape(*places.shape, -1) for values, _ in found]
+    first = np.cumsum([0, *(column.shape[-1] for column in columns[:-1])])
     curves = np.concatenate(columns, axis=-1)
     values = curves[:, 1:-1]
     last = np.einsum("ij,pjc->pic", _TO_SERIES[-2:], values)
@@ -503,6 +473,4 @@ def _fit_panels(
     missing = ~np.isfinite(sizes)
     error[missing.any(axis=1)] = np.inf
     error[missing.all(axis=1)] = 0.0
-    is_open = np.zeros(error.shape, dtype=bool)
-    fit = _Fit(start, stop, values, error, np.where(missing, np.nan, sizes), is_open)
-    return fit, first
+    return _Fit(start, stop, values, error, np.where(missing, np.nan, sizes)), first

@@ -51,11 +51,9 @@ class PositionSheet:
         self.units = units
         self.solution, self.on_change_point = find_limits(solution)
         stage = "position" if solution.omega_2 is None else "acceleration"
-        at = solution.at._replace(origin=None)
-        self.beside = [
-            solve(scene, stage, at=at._replace(angle=at.angle + away))
-            for away in (-ROUNDING_OF_PLACE, ROUNDING_OF_PLACE)
-        ]
+        at = solution.at.part(np.zeros(2, dtype=int))._replace(origin=None)
+        away = ROUNDING_OF_PLACE * np.array([-1.0, 1.0])
+        self.beside = solve(scene, stage, at=at._replace(angle=at.angle + away))
 
     def _read(self, name: str) -> Array:
         """Return a quantity, of the motion zero where it changes its sign.
@@ -65,10 +63,10 @@ class PositionSheet:
         values = np.asarray(derive(self.solution, name)[0])
         if find_derived(name) or find_unit_of_quantity(name) == "rad":
             return values
-        before, after = (derive(beside, name) for beside in self.beside)
-        if before is None:  # a pin force
+        beside = derive(self.beside, name)
+        if beside is None:  # a pin force
             return values
-        return np.where(before[0] * after[0] < 0.0, 0.0, values)
+        return np.where(beside[0] * beside[1] < 0.0, 0.0, values)
 
     def write_bars(self) -> list[str]:
         """Write angle, speed and acceleration of the moving bars."""

@@ -134,14 +134,14 @@ def _first_text(stated: Any) -> str:
 
 
 def states_radians(document: Mapping[str, Any]) -> bool:
-    """Return True if the tables of a scene file command an angle in rad."""
-    motion = document.get("motion")
-    if not isinstance(motion, Mapping):
-        return False
-    law = motion.get("law", {})
-    tables = [motion, *([law] if isinstance(law, Mapping) else [])]
-    stated = [table.get(f"theta_{bar}") for table in tables for bar in MOVING_BARS]
-    return any(re.search(r"\d\s*rad'", repr(value)) for value in stated)
+    """Return True if the tables of a scene command an angle in rad."""
+    motion = document.get("motion", {})
+    stated = [
+        table.get(f"theta_{bar}")
+        for table in (motion, motion.get("law", {}))
+        for bar in MOVING_BARS
+    ]
+    return re.search(r"\d\s*rad'", repr(stated)) is not None
 
 
 @cache
@@ -185,10 +185,8 @@ def choose_unit(largest: float, unit: str, units: Conversion = SI) -> tuple[floa
         return factor, name.replace("^2", "²")
     if not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
-    for size, prefix in PREFIXES:
-        if largest >= size:
-            return 1.0 / size, prefix + unit
-    size, prefix = PREFIXES[-1]
+    fitting = (row for row in PREFIXES if largest >= row[0])
+    size, prefix = next(fitting, PREFIXES[-1])
     return 1.0 / size, prefix + unit
 
 

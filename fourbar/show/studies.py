@@ -5,11 +5,9 @@ Output is text, or one JSON object in SI units and radians.
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from fourbar.errors import clean_line
 from fourbar.formulas.mobility import (
     TURN,
     change_points,
@@ -36,12 +34,11 @@ from fourbar.scene import find_signs
 from fourbar.scene.motion import BRANCH_NAMES
 from fourbar.show.acting import list_spring_notes
 from fourbar.show.driving import read_drive_demand
-from fourbar.show.lines import BLOCK_WIDTH, wrap_line
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.shown_units import COMMON, choose_unit, write_cell
 from fourbar.show.tables import (
     MOST_ROWS_PRINTED,
-    make_plain_table,
     write_cells,
     write_table,
 )
@@ -200,8 +197,9 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     for key in sorted(shares, key=lambda key: -shares[key]):
         rows.append([key, *(write_cell(of_name[key], ".3g") for of_name in changes)])
     heads = [f"{name}\n{find_unit_of_quantity(name)}" for name in names]
-    table = make_plain_table(["", *heads], rows, left=("",), gap=0)
-    return write_table(solution.title, lines, table, width=width or BLOCK_WIDTH)
+    width = width or BLOCK_WIDTH
+    title = solution.title
+    return write_table(title, lines, ["", *heads], rows, width=width)
 
 
 def write_sensitivity_json(derivatives: Sensitivity) -> str:
@@ -258,7 +256,7 @@ def write_equilibria(
             " this sweep, which does not reach it"
         )
         blocks.append(_write_resting("", [line], rest, others, units, width))
-    blocks.append(write_table("", *_write_holding(rest, units), width=width))
+    blocks.append(_write_holding(rest, units, width))
     return "\n\n".join(block.rstrip("\n") for block in blocks) + "\n"
 
 
@@ -271,9 +269,6 @@ def _write_resting(
     width: int | None,
 ) -> str:
     """Write the table of some equilibria with its title and lines."""
-    if not found:
-        headed = [*([clean_line(title)] if title else []), *lines]
-        return "\n".join(part for line in headed for part in wrap_line(line, width))
     torque, per_torque = find_unit_in("N m", units)
     inertia = "kg m^2"
     per_inertia = 1.0
@@ -308,14 +303,14 @@ def _write_resting(
             "-" if frequency is None else f"{frequency:.6g}",
         ]
         rows.append(row)
-    table = make_plain_table(heads, rows, left=("branch", "", "by"), gap=0)
     held = [
         f"friction holds {_write_range(rest, position.held)} about theta_2 ="
         f" {_write_degrees(position.place.theta_2)} deg"
         for position in found
         if position.held is not None
     ]
-    return write_table(title, lines, table, held, width)
+    left = ["branch", "", "by"]
+    return write_table(title, lines, heads, rows, left=left, after=held, width=width)
 
 
 def _find_assembly(rest: Equilibria, place: RestPosition) -> int:
@@ -351,11 +346,10 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]
-    positions = rest.positions
-    return [*lines, *list_spring_notes(positions.scene, positions, units)]
+    return [*lines, *list_spring_notes(rest.positions, units)]
 
 
-def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]:
+def _write_holding(rest: Equilibria, units: Conversion, width: int | None) -> str:
     """Write what holds the scene's positions, thinned out to what can be read."""
     positions = rest.positions
     drive = read_drive_demand(positions)
@@ -389,7 +383,9 @@ def _write_holding(rest: Equilibria, units: Conversion) -> tuple[list[str], Any]
             f"{largest}: {factor * values[most]:.6g} {unit} at theta_2 ="
             f" {_write_degrees(positions.theta_2[most])} deg"
         )
-    return lines, make_plain_table([*columns], rows[::every], left=("released",))
+    return write_table(
+        "", lines, columns, rows[::every], left=["released"], gap=1, width=width
+    )
 
 
 def _write_range(rest: Equilibria, ends: tuple[RestPosition, RestPosition]) -> str:
@@ -423,7 +419,7 @@ def write_equilibria_json(title: str, rest: Equilibria) -> str:
         indifferent=rest.indifferent,
         held=rest.held,
         not_decided=rest.not_decided,
-        notes=list_spring_notes(positions.scene, positions, COMMON),
+        notes=list_spring_notes(positions, COMMON),
         positions={
             "drive_bar": positions.drive_bar,
             "status": positions.status,

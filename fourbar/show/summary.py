@@ -310,24 +310,28 @@ class Facts:
     def error(self) -> float | None:
         """Largest error bar of the drive and of the pin forces, over the value.
 
-        Where the value passes through zero, it is over the median. None: no error bar
-        was computed.
+        None: no error bar was computed.
         """
-        solution = self.solution
-        drive = self.drive
-        if solution.force_error is None:
+        error = self.solution.force_error
+        if error is None:
             return None
-        loads = compute_pin_loads(solution)
-        pairs = [(solution.force_error, np.max([*loads.values()], axis=0))]
-        if drive is not None and drive.error is not None:
-            pairs.append((drive.error, drive.sizes))
-        relative: list[float] = []
-        for error, size in pairs:
-            solved = np.isfinite(error + size) & (solution.status_code == OK)
-            usual = np.median(size[solved]) if solved.any() else 0.0
-            reference = np.maximum(size, usual)
-            # where most are exactly zero, so may be one with an error bar
-            solved &= reference > 0.0
-            if solved.any():
-                relative.append(float((error[solved] / reference[solved]).max()))
-        return max(relative, default=None)
+        loads = compute_pin_loads(self.solution)
+        shares = self.relate_errors(error, np.max([*loads.values()], axis=0))
+        if self.drive is not None and self.drive.error is not None:
+            of_drive = self.relate_errors(self.drive.error, self.drive.sizes)
+            shares = np.append(shares, of_drive)
+        return max(shares[np.isfinite(shares)].tolist(), default=None)
+
+    def relate_errors(self, error: Array, size: Array) -> Array:
+        """Return error bars over the sizes of the values, (n,), NaN where none is.
+
+        Where a value passes through zero, its error bar is over the median.
+        """
+        solved = np.isfinite(error + size) & (self.solution.status_code == OK)
+        usual = np.median(size[solved]) if solved.any() else 0.0
+        reference = np.maximum(size, usual)
+        # where most are exactly zero, so may be one with an error bar
+        solved &= reference > 0.0
+        shares = np.full(len(size), np.nan)
+        np.divide(error, reference, out=shares, where=solved)
+        return shares

@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -37,10 +37,6 @@ from fourbar.solution import (
     is_scalar,
 )
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-
 MOST_DIGITS = 16
 """Largest number of significant digits of a double."""
 GAP = 2
@@ -53,42 +49,27 @@ glance.
 
 def write_table(
     title: str,
-    lines: list[str],
-    shown: "Table",
-    after: Sequence[str] = (),
+    lines: Iterable[str],
+    heads: Iterable[str],
+    rows: Sequence[Iterable[str]],
+    *,
+    left: Sequence[str] = ("",),
+    gap: int = 0,
+    after: Iterable[str] = (),
     width: int | None = None,
 ) -> str:
     """Write a table with its title and what stands above it and below.
 
-    `width`: that of a terminal.
-    """
-    from rich.console import Console
-    from rich.text import Text
+    Without a row it is left out.
 
-    text = io.StringIO()
-    console = Console(file=text, width=width or 10_000, color_system=None)
-    if title:
-        console.print(Text(clean_line(title)))
-    above, below = (
-        [Text("\n".join(wrap_line(line, width))) for line in part]
-        for part in (lines, after)
-    )
-    for part in (*above, shown, *below):
-        console.print(part)
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
-
-
-def make_plain_table(
-    heads: Iterable[str],
-    rows: Iterable[Iterable[str]],
-    left: Iterable[str] = (),
-    gap: int = 1,
-) -> "Table":
-    """Make a table whose columns are aligned to the right.
-
-    `left`: headings of those that are not.
+    Parameters
+    ----------
+    left : headings of the columns that are not aligned to the right.
+    gap : blanks between two columns, besides the divider.
+    width : that of a terminal.
     """
     from rich import box
+    from rich.console import Console
     from rich.text import Text
 
     from fourbar.show.folded import FoldedTable
@@ -100,14 +81,19 @@ def make_plain_table(
         padding=(0, gap, 0, 0),
     )
     for head in heads:
-        shown.add_column(
-            Text(head),
-            justify="left" if head in left else "right",
-            no_wrap=True,
-        )
+        justify: Any = "left" if head in left else "right"
+        shown.add_column(Text(head), justify=justify, no_wrap=True)
     for row in rows:
         shown.add_row(*map(Text, row))
-    return shown
+    text = io.StringIO()
+    if rows:
+        Console(file=text, width=width or 10_000, color_system=None).print(shown)
+    table = [line.rstrip() for line in text.getvalue().splitlines()]
+    above, below = (
+        [part for line in part_of for part in wrap_line(line, width)]
+        for part_of in (filter(None, [clean_line(title), *lines]), after)
+    )
+    return "\n".join([*above, *table, *below, ""])
 
 
 def print_positions(
@@ -137,9 +123,8 @@ def print_positions(
     kept = _fit_columns(cells, width)
     rows = [*zip(*(cells[name] for name in kept), strict=True)]
     last = rows[-1:] if (len(rows) - 1) % step else []
-    shown = make_plain_table(kept, rows[::step] + last, gap=GAP - 1)
     told = [] if solution.scene is None else list_arm_notes(solution.scene)
-    notes = [line for note in told for line in wrap_line(note)]
+    notes = [*told]
     if step > 1:
         more = "; --all shows each" if every is None else ""
         suffix = {1: "st", 2: "nd", 3: "rd"}.get(step % 10, "th")
@@ -152,7 +137,11 @@ def print_positions(
             f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has"
             " them)"
         )
-    return write_table(solution.title, [], shown, notes, width)
+    shown = rows[::step] + last
+    gap = GAP - 1
+    return write_table(
+        solution.title, [], kept, shown, gap=gap, after=notes, width=width
+    )
 
 
 def _fit_columns(cells: dict[str, list[str]], width: int | None) -> list[str]:

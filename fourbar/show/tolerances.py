@@ -5,9 +5,9 @@ Every row of the table is of the place where the spread is largest.
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +18,7 @@ from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.panels import split_runs
 from fourbar.show.shown_units import drop_rounding, write_cell
-from fourbar.show.tables import (
-    make_plain_table,
-    show_running,
-    write_table,
-)
+from fourbar.show.tables import show_running, write_table
 from fourbar.solution import DEGREES, Conversion, find_unit_in
 from fourbar.studies.spread import (
     BAND_PERCENTILES,
@@ -32,9 +28,6 @@ from fourbar.studies.spread import (
     tolerances,
 )
 from fourbar.writing import write_object
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 PAGE_SAMPLES = 2048
 """Samples behind the bands of a page. They take seconds, and give a percentile to a
@@ -116,10 +109,10 @@ def write_spreads(
     title = spreads.scene.title
     for digits in range(_MOST_SHOWN, _FEWEST_SHOWN - 1, -1):
         table = _tabulate_parts(spreads, shown, units, digits)
-        written = write_table("", [], table)
+        written = write_table("", [], *table)
         if max(map(len, written.split("\n"))) <= BLOCK_WIDTH:
             break
-    return write_table(title, lines, table, width=width or BLOCK_WIDTH)
+    return write_table(title, lines, *table, width=width or BLOCK_WIDTH)
 
 
 def _tabulate_parts(
@@ -127,15 +120,14 @@ def _tabulate_parts(
     shown: Mapping[str, int],
     units: Conversion,
     digits: int,
-) -> "Table":
-    """Make the table of parts, each at its position, with so many digits."""
+) -> tuple[list[str], list[list[str]]]:
+    """Make headings and rows of parts, each at its position, with so many digits."""
     rows = []
     name, si, places = _list_places(spreads)
     unit_of_place, of_place = find_unit_in(si, units)
     for part, worst in shown.items():
         spread = spreads.spreads[part]
-        names = ("nominal", "deviation", "low", "high", "least", "greatest")
-        columns = np.array([getattr(spread, name) for name in names])
+        columns = np.array(spread[:6])  # from nominal to greatest
         unit, factor = find_unit_in(find_part_unit(part), units)
         largest = np.nanmax(np.abs(columns), initial=0.0)
         cleaned = (factor * drop_rounding(columns[:, worst], largest)).tolist()
@@ -147,7 +139,7 @@ def _tabulate_parts(
     band = [f"\n{percentile:g} %" for percentile in BAND_PERCENTILES]
     heads = ["", "\nunit", f"{name}\n{unit_of_place}", "\nnominal", "\nsigma", *band]
     heads += ["\nleast", "\ngreatest", "worst\n+-"]
-    return make_plain_table(heads, rows, left=("",), gap=0)
+    return heads, rows
 
 
 def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[str]:
@@ -227,15 +219,13 @@ def _name_positions(spreads: Tolerances, rows: Indices, units: Conversion) -> st
 def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
     """Name the two tolerances with the largest shares of the variance."""
     shares = spread.shares[:, worst]
-    total = float(shares.sum())
-    if not total > 0.0:
-        return ""
-    named = []
-    for i in np.argsort(-shares)[:2]:
-        if shares[i] > 0.0:
-            key = spreads.scene.tolerances[i].key
-            named.append(f"{100.0 * shares[i] / total:.0f} % {key}")
-    return ", ".join(named)
+    total = shares.sum()
+    stated = spreads.scene.tolerances
+    return ", ".join(
+        f"{100.0 * shares[i] / total:.0f} % {stated[i].key}"
+        for i in np.argsort(-shares)[:2]
+        if 0.0 < shares[i] <= total
+    )
 
 
 def collect_tolerances(
@@ -254,11 +244,11 @@ def collect_tolerances(
         motion = scene.motion.replace(angle=np.array(places))
         positions = replace(scene, motion=motion)
     try:
-        with ExitStack() as stack:
-            if progress is None and scene.motion.free is None:
-                line = show_running("the samples of the tolerances are solved")
-                progress = stack.enter_context(line)
-            spreads = tolerances(positions, PAGE_SAMPLES, progress=progress)
+        running: AbstractContextManager[Any] = nullcontext(progress)
+        if progress is None:
+            running = show_running("the samples of the tolerances are solved")
+        with running as line:
+            spreads = tolerances(positions, PAGE_SAMPLES, progress=line)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     # a law is thinned as in `animate`

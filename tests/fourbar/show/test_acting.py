@@ -232,7 +232,7 @@ def test_a_spring_pulls_between_the_positions_of_a_coarse_sweep(start, stop):
     """It is longest where the crank points away from its end, between two of three."""
     springs = Springs((Spring(*ENDS, 1.0, sqrt(0.1 - 0.06 * cos(pi - 0.2))),))
     scene = Scene(MASSLESS, Motion(Sweep(start, stop, 1), 1.0), effects=(springs,))
-    (note,) = list_spring_notes(scene, solve(scene), DEGREES)
+    (note,) = list_spring_notes(solve(scene), DEGREES)
     places = [f"theta_2 = {degrees(pi + x):.4g} deg" for x in (-0.2, 0.2)]
     if stop < start:
         places = places[::-1]
@@ -250,5 +250,5 @@ def test_a_spring_pulls_in_a_release_from_between_its_instants():
     )
     scene = Scene(MASSLESS, Motion(0.5, 0.0, free=Free(0.3, 3)), effects=effects)
     time = 1e3 * acos(-0.2) / 10.0
-    (note,) = list_spring_notes(scene, solve(scene), DEGREES)
+    (note,) = list_spring_notes(solve(scene), DEGREES)
     assert f"pulls from t = {time:.4g} ms on" in note

@@ -16,16 +16,18 @@ SETTLED = 1e-9
 
 def fit(curve, edges=EDGES, wanted="integrated"):
     def compute(places):
-        return {"curve": curve(places)}
+        return {"curve": (curve(places), Wanted(**{wanted: True}))}
 
-    return fit_panels(compute, edges, {"curve": Wanted(**{wanted: True})})
+    return fit_panels(compute, edges)
 
 
 @mark.parametrize("place", (0.4, 1.0 / 3.0, 1.999))
 def test_a_jump_costs_no_digits(place):
     """On an edge or anywhere else: 2 before it and -1 after it."""
     panels = fit(lambda x: np.where(x < place, 2.0, -1.0))
-    assert panels.integrate("curve") == approx(2.0 * place - (2.0 - place), abs=1e-8)
+    assert panels.accumulate("curve")[-1] == approx(
+        2.0 * place - (2.0 - place), abs=1e-8
+    )
     assert panels.accumulate("curve").max() == approx(2.0 * place, rel=1e-8)
     assert not panels.growing
 
@@ -37,13 +39,13 @@ POLE = sqrt(0.5)
 def test_what_grows_without_bound_is_said_to_and_where(power):
     def compute(places):
         curve = np.abs(places - POLE) ** -power
-        return {"curve": curve, "other": np.exp(places)}
+        wanted = Wanted(integrated=True)
+        return {"curve": (curve, wanted), "other": (np.exp(places), wanted)}
 
-    wanted = dict.fromkeys(("curve", "other"), Wanted(integrated=True))
-    panels = fit_panels(compute, EDGES, wanted)
+    panels = fit_panels(compute, EDGES)
     assert panels.growing == {"curve"} and not panels.has_value("curve")
     assert panels.list_poles("curve") == [approx(POLE, abs=1e-7)]
-    assert panels.integrate("other") == approx(exp(2.0) - 1.0, rel=SETTLED)
+    assert panels.accumulate("other")[-1] == approx(exp(2.0) - 1.0, rel=SETTLED)
 
 
 @mark.parametrize(
@@ -88,9 +90,6 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, e
 def test_a_panel_that_is_not_settled_exceeds_no_peak(frequency):
     """Of many equal peaks the settled ones are right to a part of 1e-9."""
 
-    def compute(places):
-        return {"curve": np.exp(0.5 * np.sin(frequency * places))}
-
     edges = np.linspace(0.0, 0.7, 13)
-    panels = fit_panels(compute, edges, {"curve": Wanted(ranged=True)})
+    panels = fit(lambda x: np.exp(0.5 * np.sin(frequency * x)), edges, "ranged")
     assert panels.find_peak("curve").value == approx(exp(0.5), rel=SETTLED)
