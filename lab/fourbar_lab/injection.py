@@ -8,17 +8,18 @@ tests and prints how they ended. As a module it would import the project before 
 fault stands.
 """
 
-import importlib.abc
-import importlib.machinery
 import json
 import sys
 import time
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.machinery import PathFinder, SourceFileLoader
 from itertools import chain
 from pathlib import Path
 from types import CodeType
 from typing import Any
+from unittest.mock import patch
 
 FAULTS = Path(__file__).parent / "faults.toml"
 CHANGEABLE_PACKAGES = ("fourbar", "fourbar_validation", "tests")
@@ -57,53 +58,35 @@ def inject_fault(entry: dict[str, Any]) -> dict[str, str]:
 def _find_module_file(name: str) -> Path:
     """Find a file of a package that is not imported."""
     package, _, rest = name.partition("/")
-    spec = importlib.machinery.PathFinder.find_spec(package)
+    spec = PathFinder.find_spec(package)
     assert (
         package in CHANGEABLE_PACKAGES and spec is not None and spec.origin is not None
     ), name
     return Path(spec.origin).parent / rest
 
 
-class _FaultFinder(importlib.abc.MetaPathFinder):
-    """Finds a module that has a fault, and no other."""
+@contextmanager
+def _inject(entry: dict[str, Any]) -> Iterator[None]:
+    """Load the modules that an entry changes with its text.
 
-    def __init__(self, entry: dict[str, Any]) -> None:
-        self.texts = inject_fault(entry)
-        self.left = set(self.texts)
-        """Modules that are not loaded yet."""
+    Raises RuntimeError if one of them is not loaded.
+    """
+    texts = inject_fault(entry)
+    left = set(texts)
+    load = SourceFileLoader.get_code
 
-    def find_spec(
-        self,
-        fullname: str,
-        path: Any,
-        target: Any = None,
-    ) -> importlib.machinery.ModuleSpec | None:
-        """Find a module with the fault, or None."""
-        if fullname not in self.texts:
-            return None
-        spec = importlib.machinery.PathFinder.find_spec(fullname, path)
-        assert spec is not None and spec.origin is not None
-        self.left.discard(fullname)
-        spec.loader = _Text(fullname, spec.origin, self.texts[fullname])
-        return spec
-
-
-class _Text(importlib.machinery.SourceFileLoader):
-    """Loads a module from a text in place of its file's."""
-
-    def __init__(
-        self,
-        fullname: str,
-        path: str,
-        text: str,
-    ) -> None:
-        super().__init__(fullname, path)
-        self.text = text
-
-    def get_code(self, fullname: str) -> CodeType:
-        """Compile the text: the cache is of the file."""
-        code: CodeType = self.source_to_code(self.text.encode(), self.path)
+    def get_code(loader: Any, fullname: str) -> CodeType | None:
+        if fullname not in texts:
+            return load(loader, fullname)
+        left.discard(fullname)
+        # the cache is of the file
+        code: CodeType = loader.source_to_code(texts[fullname].encode(), loader.path)
         return code
+
+    with patch.object(SourceFileLoader, "get_code", get_code):
+        yield
+    if left:
+        raise RuntimeError(f"nothing uses {', '.join(left)}")
 
 
 def _list_failing(names: Iterable[str]) -> dict[str, list[str]]:
@@ -135,12 +118,9 @@ def _run_tests(entry: dict[str, Any]) -> dict[str, float]:
     """
     import pytest
 
-    finder = _FaultFinder(entry)
-    sys.meta_path.insert(0, finder)
     quick = ["-x", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow"]
-    status = pytest.main([*quick, entry["tests"]])
-    if finder.left:
-        raise RuntimeError(f"the tests use no {', '.join(finder.left)}")
+    with _inject(entry):
+        status = pytest.main([*quick, entry["tests"]])
     return {"status": int(status), "seconds": time.process_time()}
 
 
@@ -159,12 +139,8 @@ def inject_and_judge() -> None:
             if name.partition(".")[0] in (*CHANGEABLE_PACKAGES, "fourbar_lab"):
                 del sys.modules[name]
         entry = read_faults()[number]
-        finder = _FaultFinder(entry)
-        sys.meta_path.insert(0, finder)
-        failing = _list_failing(entry["scenes"])
-        sys.meta_path.remove(finder)
-        if finder.left:
-            raise RuntimeError(f"the scenes use no {', '.join(finder.left)}")
+        with _inject(entry):
+            failing = _list_failing(entry["scenes"])
         print(json.dumps(failing))
 
 
