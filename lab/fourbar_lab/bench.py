@@ -11,6 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import click
@@ -34,13 +35,13 @@ from fourbar_lab.contenders import (
     time_linkages,
     time_positions,
 )
-from fourbar_lab.starts import measure_starts
 from fourbar_validation.advise.clocks import time_call
 from fourbar_validation.compare.bodies import pose
 from fourbar_validation.engines.description import list_speeds
 from fourbar_validation.engines.free_body import balance, speeds_and_accelerations
 from fourbar_validation.engines.free_body_closure import close
 from fourbar_validation.engines.registry import ENGINES, Engine
+from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import name_machine
 from fourbar_validation.report.sentences import make_words_table
 from fourbar_validation.run.judge import judge_for_report
@@ -66,6 +67,18 @@ SINGLE_CALLS = 20
 """Calls of one position each."""
 _PER_SCENE = 50_000
 """Positions in whose stead one random scene is judged: twenty of them by default."""
+_SCENE = str(MODELS / "crank_rocker.toml")
+_ROW_STEP = 10
+"""Rows of the sweep's table of which `check` gets one: 37 rows, as a table by hand."""
+_IMPORT = """
+import time
+a = time.process_time()
+import numpy
+b = time.process_time()
+from fourbar import Motion, Scene, solve, uniform
+print((time.process_time() - b) / (b - a))
+"""
+"""Program that prints the time of `import fourbar` beyond NumPy's, over NumPy's."""
 SPEED_LIMITS = {
     "formulas / 13x13": (
         0.057,
@@ -349,3 +362,57 @@ def _time_judging(
         ratios.append(times[-1] * SINGLE_CALLS / time_call(single))
     # the first one imports the engines
     return median(times[1:]), median(ratios[1:])
+
+
+def measure_starts(rounds: int = 7) -> dict[str, float]:
+    """Return the processor time of an import and of each command over that of NumPy.
+
+    The medians of `rounds` ratios, each of two processes that follow one another.
+    """
+    with TemporaryDirectory() as folder:
+        table = Path(folder) / "table.csv"
+        head, *rows = _run("-m", "fourbar", "analyze", _SCENE, "--csv").splitlines()
+        table.write_text("\n".join([head, *rows[::_ROW_STEP]]), encoding="utf-8")
+        commands = {
+            "fourbar --help": ("fourbar", "--help"),
+            "fourbar-validation --help": ("fourbar_validation", "--help"),
+            "analyze": ("fourbar", "analyze", _SCENE),
+            "check": ("fourbar_validation", "check", _SCENE, str(table)),
+        }
+        ratios: dict[str, list[float]] = {name: [] for name in commands}
+        ratios["import fourbar"] = []
+        for words in commands.values():
+            _run("-m", *words)  # compiles what is not compiled yet
+        for _ in range(rounds):
+            ratios["import fourbar"].append(float(_run("-c", _IMPORT)))
+            for name, words in commands.items():
+                numpy = _spend("-c", "import numpy")
+                ratios[name].append(_spend("-m", *words) / numpy)
+    return {f"{name} / import numpy": median(of) for name, of in ratios.items()}
+
+
+def _run(*words: str) -> str:
+    """Run Python, which may write compiled modules, and return what it prints."""
+    environment = dict(os.environ)
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    done = subprocess.run(
+        [sys.executable, *words],
+        capture_output=True,
+        check=True,
+        encoding="utf-8",
+        env=environment,
+    )
+    return done.stdout
+
+
+def _spend(*words: str) -> float:
+    """Run Python and return its processor time, s.
+
+    `os.times` counts it in ticks of 10 ms, a seventh of what an import of NumPy takes.
+    """
+    import resource  # Windows has none
+
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    _run(*words)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime

@@ -4,6 +4,7 @@ Each is of a row that is measured, is reported with its reason, and costs the ru
 """
 
 import math
+from functools import partial
 
 import numpy as np
 from click.testing import CliRunner
@@ -14,7 +15,6 @@ from fourbar.quantities import UNKNOWNS
 from fourbar.solving import solve
 from fourbar_lab import bench, contenders
 from fourbar_lab.contenders import command_positions, make_example
-from fourbar_lab.starts import measure_starts
 
 ROUNDING = 1e-11
 """Relative to the largest of each unknown: a few hundred roundings."""
@@ -23,7 +23,7 @@ ROUNDING = 1e-11
 @mark.slow
 def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
     """At counts at which the times mean nothing, but everything runs."""
-    monkeypatch.setattr(bench, "measure_starts", lambda: measure_starts(1))
+    monkeypatch.setattr(bench, "measure_starts", partial(bench.measure_starts, 1))
     monkeypatch.setattr(contenders, "LEAST_POSITIONS", 1)
     monkeypatch.setattr(contenders, "MOST_LOOPED", 10)
     measured = bench.measure_speed(1000, 10_000, 1)
@@ -54,7 +54,7 @@ def test_commands_start_within_their_limits():
     for rounds in (3, 7):
         beyond = {
             what: ratio
-            for what, ratio in measure_starts(rounds).items()
+            for what, ratio in bench.measure_starts(rounds).items()
             if not ratio <= bench.SPEED_LIMITS[what][0]
         }
         if not beyond:

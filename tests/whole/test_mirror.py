@@ -64,7 +64,7 @@ validation/scenes/test_hard_families.py | bars
 validation/report/test_sections.py | hard_picture
 validation/engines/mujoco/test_simulate.py | defaults monitor
 validation/run/test_released.py | validation/engines/mujoco: forward
-validation/check/test_check.py | calculated csv_columns fitted
+validation/check/test_check.py | calculated fitted
 validation/check/test_check.py | judge_table mistakes theirs variants wrong_scenes
 validation/robots/test_check_mjcf.py | differences guard judge_loop
 validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
@@ -72,12 +72,12 @@ validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: seen
 validation/engines/mujoco/robots/test_closures.py | ancestry
 validation/robots/test_loops.py | options
 validation/published/test_published.py | comparison printed_figures thesis
-validation/regression/test_regression.py | accept engines history record render rules
+validation/regression/test_regression.py | accept history record render rules
 validation/regression/test_regression.py | scenes
 validation/report/test_report.py | machine overview run_summary
 validation/report/test_report.py | scene_record svg templating words
 # studies: each through its command
-lab/test_bench.py | contenders starts
+lab/test_bench.py | contenders
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | each fault_scenes injection

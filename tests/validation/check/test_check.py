@@ -21,9 +21,8 @@ from fourbar.scene import Scene, command, command_at
 from fourbar.scene.motion import Law
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
-from fourbar_validation.check.check import Judgement
-from fourbar_validation.check.csv_columns import MADE_OF, list_names_of_points
-from fourbar_validation.check.judge_table import Allowance, Judge
+from fourbar_validation.check.check import Judgement, list_names_of_points
+from fourbar_validation.check.judge_table import MADE_OF, Allowance, Judge
 from fourbar_validation.check.mistakes import list_column_mistakes, list_hypotheses
 from fourbar_validation.check.theirs import NOT_JUDGED, read_table
 from fourbar_validation.cli import status

@@ -22,8 +22,8 @@ from fourbar.errors import (
 )
 from fourbar.files import load
 from fourbar.quantities import STAGE_OF, UNITS
+from fourbar.scene import Scene
 from fourbar.writing import null_nan, require_file, write_text
-from fourbar_validation.check.csv_columns import list_names_of_points
 from fourbar_validation.check.judge_table import (
     Allowance,
     Discrepancy,
@@ -247,6 +247,13 @@ FEWEST_DIGITS = 1e-4
 """Part of each number by which a table may be off that is right, in fewer digits than
 it prints.
 """
+
+
+def list_names_of_points(scene: Scene) -> list[str]:
+    """List the columns of the points of a scene."""
+    return [
+        f"{start}{point.name}" for start in ("", "v_", "a_") for point in scene.points
+    ]
 
 
 @click.command("check")

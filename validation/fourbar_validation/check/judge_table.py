@@ -13,11 +13,21 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
-from fourbar.quantities import COUPLE, LINE, OK, PIN_FORCES, Array
+from fourbar.quantities import (
+    COUPLE,
+    LINE,
+    OK,
+    PIN_FORCES,
+    SPRING_NAME,
+    UNITS,
+    Array,
+    find_derived,
+)
 from fourbar.scene import Scene
+from fourbar.show.acting import list_springs
+from fourbar.show.derived import derive
 from fourbar.solution import Solution
 from fourbar.solving import solve
-from fourbar_validation.check.csv_columns import compute_column, find_made_of
 from fourbar_validation.check.row_commands import (
     RowCommands,
     find_row_commands,
@@ -38,6 +48,15 @@ from fourbar_validation.compare.tolerance import (
 
 ONE_DIGIT = 0.1
 """Largest allowed error by which a digit is compared, as a part of the scale."""
+
+MADE_OF = {
+    "shaking_force": "F12",
+    "shaking_moment": "torque",
+    "transmission": "theta_4",
+    "length": "B",
+    "force": "F12",
+}
+"""Quantity whose size and condition a column has; a spring's by what is measured."""
 
 
 class Allowance(NamedTuple):
@@ -90,6 +109,37 @@ class Discrepancy(NamedTuple):
         if self.permitted is None:
             return self.exact
         return self.exact or (self.judged and self.difference <= self.permitted)
+
+
+def find_made_of(name: str, scene: Scene) -> str:
+    """Return the quantity whose size and condition a column has: mostly itself."""
+    if name in UNITS:
+        return name
+    of_spring = SPRING_NAME.fullmatch(name)
+    kind = of_spring[2] if of_spring else name
+    if kind in MADE_OF:
+        return MADE_OF[kind]
+    start = name[:2] if name[:2] in ("v_", "a_") else ""
+    point = name.removeprefix(start)
+    bar = next(each.bar for each in scene.points if each.name == point)
+    return f"{start}G{bar}"
+
+
+def compute_column(solution: Solution, name: str) -> Array | None:
+    """Compute a column from O2, (n,) or (n, 2); None if its stage was not evaluated."""
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+        return values
+    if find_derived(name) is None:
+        of_stage = {"v_": solution.velocity, "a_": solution.acceleration}
+        stage = of_stage.get(name[:2], solution.points)
+        return stage.get(name[2:] if name[:2] in of_stage else name)
+    of_spring = SPRING_NAME.fullmatch(name)
+    if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
+        raise InputError("header", name, "does not exist in this scene")
+    values = derive(solution, name)
+    return values
 
 
 class JudgedColumn:
