@@ -46,7 +46,7 @@ def test_a_scene_without_a_title_leaves_no_empty_quotes():
 
 
 def test_one_position_is_written_into_an_array():
-    scene = crank_rocker(motion=Motion(theta_3=0.8, branch=-1))
+    scene = crank_rocker(Motion(theta_3=0.8, branch=-1))
     place = np.empty((1, 2))
     solution = solve(scene, out={"A": place})
     whole = solve(scene)

@@ -261,7 +261,7 @@ def test_where_friction_jams_the_motion_that_would_begin_the_status_says_so():
 
 def test_the_blocks_of_a_sweep_are_solved_like_its_positions():
     """Ends of two blocks, with error bars too, whose blocks are shorter."""
-    few = crank_rocker(motion=Motion(np.linspace(0.1, 6.0, 7), 10.0, 5.0))
+    few = crank_rocker(Motion(np.linspace(0.1, 6.0, 7), 10.0, 5.0))
     for stage in ("force", "error"):
         n = POSITIONS_OF_A_BLOCK // {"force": 1, "error": 4}[stage]
         rows = np.resize(np.arange(7), n + 5)

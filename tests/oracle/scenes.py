@@ -58,7 +58,7 @@ WRITTEN = {
     "fall in 20 ms": fall(0.02, 24),
     "slow fall": fall(0.4, 90),
     "pushed": crank_rocker(
-        motion=Motion(stroke=Sweep(0.19, 0.31, 36), stroke_speed=0.2, side="left"),
+        Motion(stroke=Sweep(0.19, 0.31, 36), stroke_speed=0.2, side="left"),
         drive=CYLINDER,
     ),
 }

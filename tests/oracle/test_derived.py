@@ -33,7 +33,7 @@ def passing_change_points(lengths, branch):
 
 
 def commanding(motion):
-    return crank_rocker(motion=motion, drive=CYLINDER, effects=WEIGHT)
+    return crank_rocker(motion, drive=CYLINDER, effects=WEIGHT)
 
 
 def weigh_limited(angle):
@@ -95,7 +95,7 @@ HARD = {
     ),
     "a stiff spring whose line turns within a milliradian": (
         crank_rocker(
-            motion=Motion(1.0, 2.0, 0.5), effects=(Gravity(), Springs((NEARLY_MEET,)))
+            Motion(1.0, 2.0, 0.5), effects=(Gravity(), Springs((NEARLY_MEET,)))
         ),
         "equilibria",
         AT_REST,

@@ -36,7 +36,10 @@ CYLINDER = LinearDrive(Place(1, (0.25, radians(-160.0))), Place(2, (0.09, 0.17))
 """From the ground to the input of the crank-rocker."""
 
 
-def crank_rocker(**changes):
+A_TURN = Motion(Sweep(0.1, 0.1 + 2 * pi, 60), 10.0, 5.0)
+
+
+def crank_rocker(motion=A_TURN, **changes):
     """A crank-rocker with gravity, an offset mass centre, a force and a couple."""
     linkage = FourBar(
         0.3,
@@ -47,16 +50,15 @@ def crank_rocker(**changes):
     )
     parts = {
         "linkage": linkage,
-        "motion": Motion(Sweep(0.1, 0.1 + 2 * pi, 60), 10.0, 5.0),
         "loads": (Load(4, (3.0, 0.7), arm=(0.05, 1.0)), Load(3, moment=-0.2)),
         "effects": WEIGHT,
         "title": "crank-rocker",
     }
-    return Scene(**{**parts, **changes})
+    return Scene(motion=motion, **parts | changes)
 
 
 RESTING = crank_rocker(
-    motion=Motion(radians(40.0), 0.0),
+    Motion(radians(40.0), 0.0),
     effects=(Gravity(), Friction.at(O2=0.2)),
 )
 """Held by the drive and by dry friction, whose couple at O2 is up to 0.2 N m."""
@@ -122,7 +124,7 @@ def balanced_lamp(omega_2=None):
 
 
 TURN = crank_rocker(
-    motion=Motion(Sweep(0.1, 0.1 + tau, 24), 10.0),
+    Motion(Sweep(0.1, 0.1 + tau, 24), 10.0),
     points=(Point("P", 3, (0.1, 0.7)), Point("J", 4, (0.05, 0.2))),
 )
 """A turn of the crank-rocker with points on coupler and output."""

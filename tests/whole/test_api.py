@@ -131,11 +131,9 @@ MOTIONS = [
 ]
 MADE = [
     *FAULT_SCENES.values(),
-    crank_rocker(motion=Motion(law=Rise("345", (0.1, 0.2), theta_3=0.4, steps=8))),
+    crank_rocker(Motion(law=Rise("345", (0.1, 0.2), theta_3=0.4, steps=8))),
     crank_rocker(
-        motion=Motion(
-            law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.4, 0.5, 0.6, 0.5), steps=2)
-        )
+        Motion(law=Law((0.0, 1.0, 2.0, 3.0), theta_3=(0.4, 0.5, 0.6, 0.5), steps=2))
     ),
     crank_rocker(
         linkage=replace(crank_rocker().linkage, input=Bar(0.1, mass_per_length=4.2))
@@ -149,7 +147,7 @@ def uses():
 
     def move(stated, name, value):
         drive = CYLINDER if "stroke" in stated else None
-        return crank_rocker(motion=Motion(**{**stated, name: value}), drive=drive)
+        return crank_rocker(Motion(**{**stated, name: value}), drive=drive)
 
     made = {
         f"Motion.{name}": (partial(move, stated, name), good)
@@ -301,13 +299,13 @@ def test_classify_as_json_is_what_the_formulas_say(capsys):
 
 def test_scenes_compare_by_value():
     def turn(*angles, **stated):
-        return crank_rocker(motion=Motion(np.array(angles), 10.0, **stated))
+        return crank_rocker(Motion(np.array(angles), 10.0, **stated))
 
     scene, same = turn(0.1, 0.2), turn(0.1, 0.2)
     assert scene == same and hash(scene) == hash(same) and scene != "scene"
     for changed in (
         turn(0.1, 0.3),
-        crank_rocker(motion=Motion(0.1, 10.0)),
+        crank_rocker(Motion(0.1, 10.0)),
         turn(0.1, 0.2, branch=-1),
         replace(scene, loads=scene.loads[:1]),
         replace(scene, drive_bar=4),
@@ -318,7 +316,7 @@ def test_scenes_compare_by_value():
 
 @mark.parametrize("wrong", [0, 2, -1.5, np.nan])
 def test_a_command_on_no_branch_is_refused(wrong):
-    scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
+    scene = crank_rocker(Motion(np.array([0.1, 0.2]), 10.0))
     command = fourbar.command(scene)
     for row in (np.array([wrong]), np.array([1, wrong])):
         at = command._replace(angle=command.theta_2[: len(row)], branch=row)
@@ -330,7 +328,7 @@ def test_a_command_on_no_branch_is_refused(wrong):
     "wrong", [{"branch": np.array(1)}, {"speed": [1.0, 2.0]}, {"acceleration": "1"}]
 )
 def test_a_command_of_another_shape_is_refused(wrong):
-    scene = crank_rocker(motion=Motion(np.array([0.1, 0.2]), 10.0))
+    scene = crank_rocker(Motion(np.array([0.1, 0.2]), 10.0))
     with raises(InputError, match=r"must be numbers, shape \(2,\)"):
         solve(scene, at=fourbar.command(scene)._replace(**wrong))
 

@@ -70,7 +70,7 @@ class Named(Few):
     def scene(self, index):
         text = self.names[index]
         motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
-        return crank_rocker(title=text, source=text, motion=motion)
+        return crank_rocker(motion, title=text, source=text)
 
 
 @mark.slow

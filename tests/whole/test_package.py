@@ -146,7 +146,7 @@ def test_an_extra_that_is_missing_is_one_line(
 ):
     monkeypatch.chdir(tmp_path)
     save(crank_rocker(), "scene.toml")
-    save(crank_rocker(motion=Motion(0.5, 0.0, free=Free(0.5, 4))), "free.toml")
+    save(crank_rocker(Motion(0.5, 0.0, free=Free(0.5, 4))), "free.toml")
     for name in [name for name in sys.modules if name.partition(".")[0] == library]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, library, None)

@@ -92,7 +92,7 @@ def test_every_quantity_of_a_scene_is_described(results):
         )
         for row in read_columns(file)
     ]
-    rows += judge("whole range", crank_rocker(motion=Motion(None, 10.0)), []).rows
+    rows += judge("whole range", crank_rocker(Motion(None, 10.0)), []).rows
     identities = {row.quantity for row in rows if row.engine == FORMULAS}
     of_engines = {*WHOLE_ENGINE, *RELEASED_ERRORS, SHIPPED, *OF_A_SCENE}
     assert set(described) == (identities | of_engines) - of_positions

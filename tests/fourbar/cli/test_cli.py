@@ -100,7 +100,7 @@ def test_json_and_csv_have_every_key_and_every_digit(name, show):
 
 
 def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
-    save(crank_rocker(motion=Motion(1.0)), "scene.toml")
+    save(crank_rocker(Motion(1.0)), "scene.toml")
     document = strict(show("analyze", "scene.toml", "--json"))
     assert set(CONTRACT) <= set(document) and np.shape(document["theta_3"]) == (1,)
     assert document["torque"] is document["F12"] is document["omega_2"] is None
@@ -111,7 +111,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
 
 @mark.slow
 def test_a_free_motion_has_time_and_no_drive(show):
-    save(crank_rocker(motion=Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "scene.toml")
+    save(crank_rocker(Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "scene.toml")
     document = strict(show("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
@@ -198,7 +198,7 @@ def test_a_terminal_gets_some_forty_rows():
     columns = tables.list_columns(solve(load(CRANK_ROCKER)))
     assert any("omega_4" in name for name in columns)
     assert not any(name.startswith("omega_2\n") for name in columns)
-    alone = tables.print_positions(solve(crank_rocker(motion=Motion(1.0, 10.0))), 80)
+    alone = tables.print_positions(solve(crank_rocker(Motion(1.0, 10.0))), 80)
     assert len([line for line in alone.splitlines() if ROW.match(line)]) == 1
 
 
@@ -276,7 +276,7 @@ def test_a_stroke_that_is_not_commanded_is_found_where_the_column_has_it(
 ):
     """Of a cylinder from the ground to the coupler."""
     drive = LinearDrive(Place(1, (0.29, -1.0)), Place(3, (0.1, -0.26)))
-    scene = crank_rocker(motion=Motion(Sweep(0.3, 1.2, 9), 1.0), drive=drive)
+    scene = crank_rocker(Motion(Sweep(0.3, 1.2, 9), 1.0), drive=drive)
     stroke = solve(scene).stroke[4]
     save(scene, tmp_path / "cylinder.toml")
     out = show("analyze", tmp_path / "cylinder.toml", "--at", f"stroke={stroke:.17g} m")

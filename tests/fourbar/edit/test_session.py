@@ -409,8 +409,7 @@ def test_the_arrow_of_a_load_goes_where_it_is_dragged_and_a_negative_force_stays
     s = drag(loaded, [*path, "force"], TO + arrow, stretch=2.0)
     pull, angle = loaded.now.scene.loads[3].force
     assert pull == approx(2.0 * float(size.split(maxsplit=1)[0]), rel=0.02)
-    turned = angle + (float(s.theta_3[0]) if frame == "bar" else 0.0)
-    acts = pull * cis(turned)
+    acts = pull * cis(angle + (float(s.theta_3[0]) if frame == "bar" else 0.0))
     assert np.angle(acts / arrow) == approx(0.0, abs=0.02)
 
 

@@ -104,7 +104,7 @@ def test_pin_load_friction_needs_the_pin_forces():
     motion = Motion(1.0, 0.0, free=Free(1.0, 10))
     friction = PinFriction.at(A=(0.1, 0.01))
     with raises(LimitError, match="pin forces: state effects"):
-        solve(crank_rocker(motion=motion, effects=(friction,)))
+        solve(crank_rocker(motion, effects=(friction,)))
 
 
 def test_a_table_is_linear_between_its_points_and_periodic():

@@ -157,7 +157,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
 @mark.parametrize("start_bar, end_bar", PAIRS)
 def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     motion = Motion(np.array([0.4, 1.3, 2.0, 4.5]), 10.0)
-    scene = crank_rocker(drive=ends(start_bar, end_bar), motion=motion)
+    scene = crank_rocker(motion, drive=ends(start_bar, end_bar))
     speeds = solve(scene).stroke_speed / 10.0
     held = (*scene.effects, Friction.at(O2=0.05))
     rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))

@@ -142,7 +142,7 @@ ENDS = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
 
 def test_where_its_ends_meet_a_spring_that_only_pulls_is_off():
     spring = Spring(*ENDS, 200.0, 0.05, acts="pull")
-    scene = crank_rocker(motion=Motion([0.7, 0.9], 8.0), effects=(Springs((spring,)),))
+    scene = crank_rocker(Motion([0.7, 0.9], 8.0), effects=(Springs((spring,)),))
     s = solve(scene)
     assert s.status == ["ok", "ok"]
     assert s.torque[0] == solve(replace(scene, effects=())).torque[0]
@@ -151,7 +151,7 @@ def test_where_its_ends_meet_a_spring_that_only_pulls_is_off():
 def test_a_sensitivity_is_null_where_a_spring_comes_off_and_nowhere_else():
     """The distance of the ends is 2 r sin(half the angle between them)."""
     scene = crank_rocker(
-        motion=Motion([1.4, 1.7, 2.0], 0.0),
+        Motion([1.4, 1.7, 2.0], 0.0),
         effects=(Springs((Spring(*ENDS, 200.0, 0.2 * sin(0.5), acts="pull"),)),),
     )
     slopes = sensitivity(scene)

@@ -97,7 +97,7 @@ def test_the_couple_of_a_loaded_pin_is_its_force_times_the_radius_of_friction(
     """With the couples mu r |F| as loads the forces are the same."""
     friction = PinFriction.at(**{pin: (0.1, 0.02) for pin in pins})
     angles = np.linspace(0.1, 6.0, 13)
-    case = crank_rocker(motion=Motion(angles, 10.0), drive_bar=drive_bar, loads=())
+    case = crank_rocker(Motion(angles, 10.0), drive_bar=drive_bar, loads=())
     s = solve(replace(case, effects=(Gravity(), friction)))
     largest = max(np.hypot(*s[name].T).max() for name in PIN_FORCE.values())
     assert s.friction_residual.max() <= 8.0 * EPS * 0.1 * 0.02 * largest

@@ -110,7 +110,7 @@ def test_what_a_file_cannot_hold_is_refused(write, scene, words):
 
 @mark.parametrize("write", [write_sdf, partial(write_sdf, reader="drake"), write_usd])
 def test_without_loads_a_file_says_so_and_how_to_start(write):
-    scene = crank_rocker(motion=Motion(1.0, 3.0))
+    scene = crank_rocker(Motion(1.0, 3.0))
     text = write(scene, without_loads=True)
     assert "loads are left out" in text and "puts on bar 2" in text
     s = solve(scene, "velocity")

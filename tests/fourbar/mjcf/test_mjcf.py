@@ -124,7 +124,7 @@ def test_the_joints_count_the_turns_of_every_spring():
     """
     rests = {"O4": 1.0 + 3 * tau, "B": 0.5 - 2 * tau}
     springs = Torsion.at(**{pin: (0.1, rest, 0.0) for pin, rest in rests.items()})
-    _, data = opened(crank_rocker(motion=Motion(1.0, 10.0), effects=(springs,)))
+    _, data = opened(crank_rocker(Motion(1.0, 10.0), effects=(springs,)))
     at_O2, at_A, at_O4 = data.qpos
     assert gap(data) < OPEN
     assert abs(at_O4 - rests["O4"]) < pi
@@ -136,7 +136,7 @@ def test_opens_assembled_and_moves_without_keyframe_or_control():
     rng = np.random.default_rng(SEED)
     # the joints start where these put them, far from the angles' first turn
     springs = Torsion.at(O2=(0.1, 9.0, 0.0), A=(0.1, -12.0, 0.0))
-    sprung = crank_rocker(motion=Motion(1.0, 10.0), effects=(springs,))
+    sprung = crank_rocker(Motion(1.0, 10.0), effects=(springs,))
     scenes = [sprung, *map(load, list_model_files())]
     for scene in [*scenes, *(random_scene(rng, kind) for kind in [*DrawnType] * 3)]:
         model, data = opened(scene)

@@ -38,7 +38,7 @@ GROUND = Place(1, (0.3, 2.2))
 
 def scene(bar, stroke, side="left", **motion):
     return crank_rocker(
-        motion=Motion(stroke=stroke, side=side, **motion),
+        Motion(stroke=stroke, side=side, **motion),
         drive=LinearDrive(GROUND, ENDS[bar]),
         effects=WEIGHT,
     )
@@ -109,14 +109,14 @@ def test_where_the_line_passes_the_pin_the_stroke_is_at_its_end_and_singular():
 def test_what_cannot_be_is_refused_in_one_line(motion, says):
     with refused(says):
         by_stroke = Motion(**json.loads(motion))
-        solve(crank_rocker(motion=by_stroke, drive=LinearDrive(GROUND, ENDS[2])))
+        solve(crank_rocker(by_stroke, drive=LinearDrive(GROUND, ENDS[2])))
 
 
 def test_who_does_not_take_it_says_so():
     with refused("no release besides"):
         Motion(stroke=0.3, side="left", free=Free(1.0, 2))
     with raises(InputError, match=r"motion\.stroke.*cylinder"):
-        crank_rocker(motion=Motion(stroke=0.3, side="left"))
+        crank_rocker(Motion(stroke=0.3, side="left"))
     by_stroke = scene(2, Sweep(0.25, 0.35, 8), stroke_speed=0.2)
     with raises(FourBarError, match=r"motion\.stroke"):
         write_mjcf(by_stroke)

@@ -73,7 +73,7 @@ def embedded(page):
 def test_what_is_solved_already_changes_no_number():
     turn, backwards = Sweep(0.0, 2.0 * pi, 12), Sweep(3.0, 1.0, 12)
     for angles in (turn, backwards, 1.0):
-        scene = crank_rocker(motion=Motion(angles, 10.0))
+        scene = crank_rocker(Motion(angles, 10.0))
         plain = animate.collect_live_data(scene, signs=(1, -1))
         shown = animate.collect_live_data(scene, signs=(1, -1), solved=solve(scene))
         assert_equal(shown, plain)
@@ -89,8 +89,7 @@ def test_a_single_position_is_one_of_the_rows_and_the_first_shown():
 
 def test_a_single_position_has_the_angles_of_its_solution():
     """The table begins at 0 deg, from where the output of a parallelogram goes on."""
-    motion = Motion(radians(200.0), 3.0)
-    scene = crank_rocker(linkage=bare(*PARALLELOGRAM), motion=motion)
+    scene = crank_rocker(Motion(radians(200.0), 3.0), linkage=bare(*PARALLELOGRAM))
     data = animate.collect_page_data(scene, {})
     assert data["branches"]["1"]["theta_4"][data["start"]] == approx(radians(-160.0))
 
@@ -115,7 +114,7 @@ def test_what_is_rounding_of_its_kind_is_zero(model, row, name):
     assert np.count_nonzero(shown[here]) == np.count_nonzero(solved[here]) - 1
 
 
-RELEASED = crank_rocker(motion=Motion(0.5, 0.0, free=Free(1.8, 90)), drive_bar=2)
+RELEASED = crank_rocker(Motion(0.5, 0.0, free=Free(1.8, 90)), drive_bar=2)
 
 
 def test_a_released_motion_has_an_energy_and_no_torque():
@@ -130,13 +129,13 @@ def test_a_released_motion_has_an_energy_and_no_torque():
 )
 def test_what_is_too_quick_to_see_is_slowed_down_by_a_power_of_ten(duration, rate):
     law = Law((0.0, 0.5 * duration, duration), (0.0, 1.0, 2.0), ends="rest")
-    data = embedded(animate.write_page(crank_rocker(motion=Motion(law=law))))
+    data = embedded(animate.write_page(crank_rocker(Motion(law=law))))
     assert data["rate"] == approx(rate)
     assert len(data["branches"]["1"]["torque"]) == 361
 
 
 def test_a_fine_sweep_is_thinned_evenly_and_says_so():
-    scene = crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36_000), 1.0))
+    scene = crank_rocker(Motion(Sweep(0.0, 2 * pi, 36_000), 1.0))
     data = embedded(animate.write_page(scene))
     assert len(data["theta_2"]) == animate.MAX_ROWS
     assert np.diff(data["theta_2"]) == approx(2 * pi / (animate.MAX_ROWS - 1))

@@ -453,14 +453,14 @@ def test_the_block_says(name):
 
 
 def test_the_head_of_one_listed_position_has_its_own_rates():
-    scene = crank_rocker(motion=Motion([0.2, 1.4], [0.0, 9.0], [3.0, -1.0]))
+    scene = crank_rocker(Motion([0.2, 1.4], [0.0, 9.0], [3.0, -1.0]))
     text = read_block(solve(scene, at=command(scene).part([0])))
     assert "drive on the input, at rest, alpha_2 = 3 rad/s²" in text
     assert "at rest" not in block(scene) and "-1 rad/s² to 3" in block(scene)
 
 
 def test_the_block_has_the_numbers_of_the_facts():
-    facts = Facts(solve(crank_rocker(motion=turn(360)), "error"))
+    facts = Facts(solve(crank_rocker(turn(360)), "error"))
     text = "\n".join(SceneBlock(facts.solution).write())
     duty = facts.duty
     peak = facts.peak
@@ -502,8 +502,8 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
     """A friction couple of 0.5 N m at O2 holds the static torque within as much."""
     sweep = Motion(Sweep(0.2, 1.4, steps) if steps > 1 else 0.2, 0.0)
     fine = Motion(Sweep(0.2, 1.4, 1000) if steps > 1 else 0.2, 0.0)
-    static = solve(crank_rocker(motion=fine, effects=WEIGHT)).torque
-    held = crank_rocker(motion=sweep, effects=(*WEIGHT, Friction.at(O2=0.5)))
+    static = solve(crank_rocker(fine, effects=WEIGHT)).torque
+    held = crank_rocker(sweep, effects=(*WEIGHT, Friction.at(O2=0.5)))
     digits = 6
     where = ": dry friction holds"
     if steps > 1:
@@ -520,10 +520,10 @@ def test_the_range_at_rest_reaches_from_the_least_to_the_greatest_that_is_held(s
 def test_a_start_from_rest_works_against_the_whole_of_dry_friction(alpha, angle):
     """Nothing holds it there: 0.2 N m at O2 act against the acceleration."""
     still = Motion(angle, 0.0 * np.array(angle), np.full_like(angle, alpha))
-    starts = solve(crank_rocker(motion=still, effects=WEIGHT)).torque
+    starts = solve(crank_rocker(still, effects=WEIGHT)).torque
     starts = starts + np.copysign(0.2, alpha)
     largest = starts[np.abs(starts).argmax()]
-    scene = crank_rocker(motion=still, effects=(*WEIGHT, Friction.at(O2=0.2)))
+    scene = crank_rocker(still, effects=(*WEIGHT, Friction.at(O2=0.2)))
     facts = Facts(solve(scene))
     start = facts.motion.start.value
     assert start == approx(largest, rel=1e-12)
@@ -560,7 +560,7 @@ def test_what_is_held_or_moved_across_a_pole_has_no_bound():
     """No couple on the output holds the linkage where bars 2 and 3 are in line."""
     still = Motion(Sweep(0.2, 1.4, 7), 0.0)
     held = crank_rocker(
-        motion=still, drive_bar=4, effects=(*WEIGHT, Friction.at(O2=0.5, O4=0.5))
+        still, drive_bar=4, effects=(*WEIGHT, Friction.at(O2=0.5, O4=0.5))
     )
     text = block(held)
     assert "torque grows without bound" in text and "dry friction holds" not in text
@@ -582,7 +582,7 @@ def test_a_release_that_stops_says_when_and_where():
 def test_a_reversal_of_a_motion_law_is_named_by_its_time():
     """A sine of 0.5 Hz that begins at 30 deg of its turn turns back at 1/3 s."""
     law = Sine(1.0, 0.7, pi, 0.6, pi / 6.0, steps=30)
-    scene = crank_rocker(motion=Motion(law=law), effects=(Friction.at(O2=0.05),))
+    scene = crank_rocker(Motion(law=law), effects=(Friction.at(O2=0.05),))
     said = "reverses, and torque or pin forces jump, at t = "
     assert f"{said}0.3333 s (O2)" in block(scene)
     figure = draw_figure(scene, "kinematics").figure
@@ -591,10 +591,10 @@ def test_a_reversal_of_a_motion_law_is_named_by_its_time():
 
 def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero():
     """Friction of 5 N m at O2 holds; the law comes to rest at 0.3 and 0.8 rad."""
-    torques = solve(crank_rocker(motion=Motion([0.3, 0.8], 0.0))).torque
+    torques = solve(crank_rocker(Motion([0.3, 0.8], 0.0))).torque
     law = Rise("345", (0.5, 0.2), theta_2=0.3, dwell=0.1, fall=0.1, steps=37)
     effects = (*WEIGHT, Friction.at(O2=5.0))
-    text = block(crank_rocker(motion=Motion(law=law), effects=effects))
+    text = block(crank_rocker(Motion(law=law), effects=effects))
     first, last = (f"{x - 5.0:.4g} N m to {x + 5.0:.4g} N m" for x in torques)
     at_rest = f"{first} at t = 0 s, {last} over t = 0.2 s to 0.3 s"
     assert f"at rest {at_rest}, {first} at t = 0.4 s: dry" in text
@@ -602,7 +602,7 @@ def test_a_dwell_is_held_by_its_whole_range_and_energy_that_is_rounding_is_zero(
     assert f"{said}0.2 s (O2), 0.3 s (O2)" in text and "reverses" not in text
     angles = (radians(10.0), radians(70.0))
     lifts = Motion(law=Law((0.0, 2.5), angles, omega_2=(0.0, 0.0)))
-    assert "over the motion given, 0 mJ taken back" in block(crank_rocker(motion=lifts))
+    assert "over the motion given, 0 mJ taken back" in block(crank_rocker(lifts))
 
 
 def test_a_law_that_starts_and_stops_bears_what_stands_beside_these_instants():
@@ -611,7 +611,7 @@ def test_a_law_that_starts_and_stops_bears_what_stands_beside_these_instants():
         (0.0, 0.2, 0.6, 0.65), (1.2, 1.4, 2.2, 2.25), omega_2=(0.0, 2.0, 2.0, 0.0)
     )
     effects = (*WEIGHT, Friction.at(O2=0.5, O4=0.5))
-    scene = crank_rocker(motion=Motion(law=law), effects=effects)
+    scene = crank_rocker(Motion(law=law), effects=effects)
     inside = solve(scene, at=command_at(scene, np.linspace(1e-9, 0.65 - 1e-9, 4001)))
     for pin in PIN_FORCES:
         largest = np.hypot(*np.transpose(inside[pin])).max()
@@ -619,7 +619,7 @@ def test_a_law_that_starts_and_stops_bears_what_stands_beside_these_instants():
         assert peak.value == approx(largest, rel=1e-4)
     first = solve(scene, at=command_at(scene, np.zeros(1)))
     alone = Motion(1.2, 0.0, float(first.alpha_2[0]))
-    starts = Facts(solve(crank_rocker(motion=alone, effects=effects))).motion.start
+    starts = Facts(solve(crank_rocker(alone, effects=effects))).motion.start
     assert Facts(first).motion.start.value == approx(starts.value, rel=1e-12)
 
 
@@ -634,21 +634,19 @@ def test_a_bore_at_rest_moves_the_linkage_against_its_friction(senses, alpha):
     motion = Motion(Sweep(1.0, 2.6, 8), 0.0, alpha)
     rubbing = {"loads": (SPIKE,), "effects": (Friction.at(O2=5.0),), "drive": CYLINDER}
     speed = 1e-9 * np.array(senses)
-    creeping = crank_rocker(
-        motion=Motion(0.0 * speed + CORNERS[2], speed, alpha), **rubbing
-    )
+    creeping = crank_rocker(Motion(0.0 * speed + CORNERS[2], speed, alpha), **rubbing)
     creeps = solve(creeping)
     force = np.abs(creeps.drive_force).max()
     pin = np.hypot(*creeps.F12.T).max()
     bore = 1e3 * sqrt(4.0 * force / (pi * 210e5))
-    text = block(crank_rocker(motion=motion, **rubbing), pressure=210e5)
+    text = block(crank_rocker(motion, **rubbing), pressure=210e5)
     assert f"to move {pin:.4g} N" in text
     assert re.search(rf"{bore:.4g} mm\b[^;]* to pull {force:.4g} N", text)
 
 
 def test_a_bore_pushes_and_pulls_the_most_of_a_motion():
     coarse, fine = (
-        crank_rocker(motion=Motion(Sweep(1.0, 2.6, steps), 10.0), drive=CYLINDER)
+        crank_rocker(Motion(Sweep(1.0, 2.6, steps), 10.0), drive=CYLINDER)
         for steps in (8, 4000)
     )
     force = solve(fine).drive_force
@@ -664,7 +662,7 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     effects = (*WEIGHT, PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
     rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
     at_rest, *ways = (
-        solve(crank_rocker(motion=Motion(angle, speed), **rubbing))
+        solve(crank_rocker(Motion(angle, speed), **rubbing))
         for speed in (0.0, 1e-9, -1e-9)
     )
     lines = SceneBlock(at_rest, units("N N.m")).write()
@@ -675,15 +673,15 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
         sizes = [[motion.find_peak(name).value for motion in motions] for name in group]
         printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
         assert printed == approx(np.max(sizes, axis=1), rel=2e-4)
-    assert "to move" not in block(crank_rocker(motion=Motion(angle, 0.0)))
+    assert "to move" not in block(crank_rocker(Motion(angle, 0.0)))
 
 
 def test_a_list_that_starts_and_moves_bears_the_friction_of_its_start():
     creeping = Motion([0.2, 1.4], [1e-9, 2.0], [30.0, 0.0])
     rubs = {"effects": (*WEIGHT, PinFriction.at(A=(0.3, 0.02)))}
-    creeps = solve(crank_rocker(motion=creeping, **rubs))
+    creeps = solve(crank_rocker(creeping, **rubs))
     starting = creeping.replace(omega_2=[0.0, 2.0])
-    lines = SceneBlock(solve(crank_rocker(motion=starting, **rubs)), units("N")).write()
+    lines = SceneBlock(solve(crank_rocker(starting, **rubs)), units("N")).write()
     row = next(line for line in lines if line.startswith("  to move"))
     pins = [np.hypot(*creeps[name].T).max() for name in PIN_FORCES]
     assert [float(size) for size in re.findall(r"\d[\d.]*", row)] == approx(pins, 2e-4)

@@ -72,8 +72,7 @@ WITHIN = {
 
 @mark.parametrize("within", WITHIN.values(), ids=WITHIN)
 def test_what_acts_within_a_linkage_at_rest_leaves_its_weight_on_the_frame(within):
-    motion = Motion(np.linspace(0.3, 1.2, 4), 0.0)
-    s = solve(crank_rocker(loads=(), motion=motion, **within))
+    s = solve(crank_rocker(Motion(np.linspace(0.3, 1.2, 4), 0.0), loads=(), **within))
     weights = [-9.81 * bar.mass for bar in s.scene.linkage.moving]
     moment = sum(
         weight * s[f"G{bar}"][:, 0]
@@ -93,7 +92,7 @@ def test_the_mean_torque_of_a_law_is_the_work_over_the_angle(second):
     law = Law((0.0, 0.2, 0.5, 1.0), (0.1, second, 3.7, 0.1 + tau), ends="periodic")
     assert (law.at(np.zeros(1))[1] > 0.0) == (second > 0.0)
     damped = (Viscous.at(O2=0.01),)
-    solution = solve(crank_rocker(motion=Motion(law=law), effects=damped))
+    solution = solve(crank_rocker(Motion(law=law), effects=damped))
     duty = motor_duty(solution)
     load = bearing_load(solution, "A")
     assert law.at(np.array([load.time]))[0] == approx(load.where)
@@ -127,7 +126,7 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
 
 
 def test_the_json_holds_the_duty():
-    s = solve(crank_rocker(motion=Motion(Sweep(0.1, 0.1 + tau, 60), 10.0)))
+    s = solve(crank_rocker(Motion(Sweep(0.1, 0.1 + tau, 60), 10.0)))
     duty = motor_duty(s)
     entry = list_duty(s, units("imperial"))
     inch = 0.0254
@@ -145,7 +144,7 @@ def test_the_json_holds_the_duty():
 @mark.parametrize("stop", [0.1 + tau, 2.5])
 def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
     """Nothing stands between them; equal ends of a turn count once in a mean."""
-    s = solve(crank_rocker(motion=Motion(np.linspace(0.1, stop, 61), 10.0)))
+    s = solve(crank_rocker(Motion(np.linspace(0.1, stop, 61), 10.0)))
     assert describe_motion(s).solve_with_peaks() is s
     duty = motor_duty(s)
     assert duty.peak_power == np.abs(s.power).max()
@@ -166,7 +165,7 @@ def test_a_study_has_shaking_and_its_members_a_duty():
 
 def test_a_study_of_a_motion_law_keeps_its_time():
     law = Law((0.0, 0.5, 1.0, 1.5, 2.0), (0.0, 0.0, 2.0, 2.0, 0.0), 20, "rest")
-    scene = crank_rocker(motion=Motion(law=law), loads=())
+    scene = crank_rocker(Motion(law=law), loads=())
     study = solve(vary(scene, {"bars.input.mass": [0.2, 0.2]}))
     alone = solve(scene)
     assert np.array_equal(study.time, [alone.time, alone.time])
@@ -178,7 +177,7 @@ def test_a_study_of_a_motion_law_keeps_its_time():
 def test_a_turn_on_a_part_of_which_a_spring_is_wound_has_no_energies():
     """A spring keeps what it is given: the energies of the rest would be no turn's."""
     torsion = Torsion.at(A=(2.0, radians(86.0), 0.0))
-    scene = crank_rocker(motion=Motion(Sweep(0.0, tau, 120), 1.0), effects=(torsion,))
+    scene = crank_rocker(Motion(Sweep(0.0, tau, 120), 1.0), effects=(torsion,))
     duty = motor_duty(solve(scene))
     assert duty.closed
     assert (duty.energy_in, duty.energy_out, duty.energy_swing) == (None, None, None)

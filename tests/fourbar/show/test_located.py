@@ -169,7 +169,7 @@ def test_a_law_has_a_value_at_times_and_none_while_it_dwells():
 @mark.parametrize("omega", [0.5, -0.5])
 def test_a_steady_sweep_has_a_place_at_each_time(omega):
     """A backward sweep begins at its other end, as its column of times has it."""
-    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.2, 10), omega))
+    scene = crank_rocker(Motion(Sweep(0.2, 1.2, 10), omega))
     found = locate(scene, "time", "1.3 s")
     begin = 0.2 if omega > 0.0 else 1.2
     assert found.angle == approx([begin + 1.3 * omega], abs=1e-12)
@@ -178,10 +178,10 @@ def test_a_steady_sweep_has_a_place_at_each_time(omega):
 
 
 LAW = crank_rocker(
-    motion=Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest"))
+    Motion(law=Law((0.0, 1.0, 2.0), (0.3, 2.0, 0.5), steps=20, ends="rest"))
 )
 DROPPED = crank_rocker(
-    motion=Motion(1.0, 0.0, free=Free(1.0, 50)),
+    Motion(1.0, 0.0, free=Free(1.0, 50)),
     effects=WEIGHT,
 )
 
@@ -198,7 +198,7 @@ def test_a_law_passes_an_angle_up_and_down():
 def test_a_knot_of_a_law_is_one_place():
     """Its steps have the knot too, apart by a rounding of their times."""
     knots = Law((-0.1, 0.1, 0.2, 0.5), (1.9, 2.0, 2.2, 2.5), steps=12, ends="rest")
-    found = locate(crank_rocker(motion=Motion(law=knots)), "time", "0.1 s")
+    found = locate(crank_rocker(Motion(law=knots)), "time", "0.1 s")
     assert found.time == approx([0.1], abs=LOCATED)
 
 
@@ -240,7 +240,7 @@ def test_a_release_has_a_value_at_times():
 def test_times_and_angles_that_a_law_does_not_pass_are_refused():
     beyond = Law((0.0, 1.0), (0.4, 2.0), ends="rest")
     stops = Scene(bare(0.6, 0.3, 0.35, 0.25), Motion(law=beyond))
-    still = crank_rocker(motion=Motion(Sweep(0.2, 1.2, 10)))
+    still = crank_rocker(Motion(Sweep(0.2, 1.2, 10)))
     for scene, name, value, words in (
         (LAW, "theta_2", "3 rad", "no position has it; theta_2 goes from"),
         (stops, "theta_2", "1.5 rad", "goes from .* to 1.31812"),  # acos(1/4)
@@ -286,7 +286,7 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
 @mark.slow
 def test_a_column_with_poles_says_that_it_grows_without_bound():
     """omega_2/omega_4 of a crank-rocker is never small, and infinite at its limits."""
-    scene = crank_rocker(motion=Motion())
+    scene = crank_rocker(Motion())
     for value, why in (("1", "jumps"), ("max", "has none")):
         with raises(NotAssembledError, match=f"{why}.*, and grows without"):
             locate(scene, "mechanical_advantage", value)

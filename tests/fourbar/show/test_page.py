@@ -242,7 +242,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
     show, motion, place, over, pace
 ):
     """The ends of the sweep of the output do not assemble."""
-    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    scene = crank_rocker(motion, drive=CYLINDER)
     page = show(scene)
     s = solve(scene)
     page.run("go(20)")
@@ -267,7 +267,7 @@ def test_another_command_is_the_axis_and_the_linkage_follows(
 @mark.slow
 def test_what_is_downloaded_is_the_scene_on_the_branch_shown(show, tmp_path):
     motion = Motion(np.array([0.1, 0.2, 0.3, 0.4]), 10.0, 5.0)
-    scene = crank_rocker(title="a\\nb", motion=motion)
+    scene = crank_rocker(motion, title="a\\nb")
     page = show(scene)
     assert "at ω₂ = 10 rad/s the mechanism takes 0.03 s." in page["pace"].text
     assert loads(page.state("sceneFile()")).motion.branch == 1
@@ -503,7 +503,7 @@ def test_with_reduced_motion_it_moves_twice_a_second(show):
 
 
 def test_positions_alone_show_no_dynamics(show):
-    page = show(crank_rocker(motion=Motion(Sweep(0.0, 2 * pi, 36))))
+    page = show(crank_rocker(Motion(Sweep(0.0, 2 * pi, 36))))
     assert not page["forces"].is_displayed()
     assert page["omega_3"].text == "–"
     page["forward"].click()

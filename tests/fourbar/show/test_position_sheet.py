@@ -40,7 +40,7 @@ from tests.support.texts import PLIERS
 SIX_DIGITS = 6e-6
 
 
-ONE = crank_rocker(motion=Motion(1.0, 10.0, 3.0), points=(Point("P", 3, (0.1, 0.7)),))
+ONE = crank_rocker(Motion(1.0, 10.0, 3.0), points=(Point("P", 3, (0.1, 0.7)),))
 
 
 def numbers(line):

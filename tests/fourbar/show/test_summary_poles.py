@@ -104,7 +104,7 @@ RUBBING = PinFriction.at(O4=(0.12, 0.006)), Gravity()
 POLES = {
     "cylinder in line with the crank": (
         crank_rocker(
-            motion=sweep(CRANK_ROCKER_LENGTHS, 0.1, 0.1 + tau).motion, drive=CYLINDER
+            sweep(CRANK_ROCKER_LENGTHS, 0.1, 0.1 + tau).motion, drive=CYLINDER
         ),
         [IN_LINE + pi, IN_LINE + tau],
     ),
@@ -194,7 +194,7 @@ def test_power_beside_a_pole_of_the_torque_has_its_peak_and_mean():
 @mark.parametrize("speed", (10.0, np.array([10.0, 5.0])))
 def test_a_listed_position_without_a_lever_is_one_at_which_the_force_grows(speed):
     """Ends of the cylinder and O2 are in line; another position has a force."""
-    scene = crank_rocker(motion=Motion(np.array([1.0, IN_LINE]), speed), drive=CYLINDER)
+    scene = crank_rocker(Motion(np.array([1.0, IN_LINE]), speed), drive=CYLINDER)
     assert list(solve(scene).status) == ["ok", "no_lever"]
     facts = find_facts(scene)
     assert facts.peak is facts.motion.find_peak("F12") is None

@@ -106,7 +106,7 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass_and_bent_by_its_inertia():
 
 
 def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan():
-    scene = crank_rocker(motion=Motion(np.radians([30.0, 60.0])))
+    scene = crank_rocker(Motion(np.radians([30.0, 60.0])))
     moving = crank_rocker()
     for case, bar, stations, words in (
         (scene, 2, None, "solve up to the stage 'force'"),
@@ -116,7 +116,7 @@ def test_what_cannot_be_is_refused_and_what_has_no_forces_is_nan():
         with refused(words):
             solved(case, bar, stations)
     rocking = Motion(theta_4=np.array([0.2, 2.0]), omega_4=1.0)
-    internal = solved(crank_rocker(motion=rocking), 3)
+    internal = solved(crank_rocker(rocking), 3)
     for values in (internal.M, internal.largest.moment):
         assert np.isnan(values[0]).all() and np.isfinite(values[1]).all()
 

@@ -64,7 +64,7 @@ def find_positions(scene, name, value):
 @mark.parametrize(
     "scene, name",
     [
-        (crank_rocker(motion=Motion()), "theta_4"),
+        (crank_rocker(Motion()), "theta_4"),
         (replace(STROKES, motion=Motion(), tolerances=()), "stroke"),
         (STROKES, "theta_4"),
     ],
@@ -219,7 +219,7 @@ def test_an_angle_beyond_a_limit_by_its_rounding_is_the_limit(beyond, met):
 def test_a_turn_begins_no_further_on_than_the_motion_needs():
     """A torsion spring is wound a turn away from the position that is stated."""
     effects = (Torsion.at(O2=(1.0, 0.0, 0.0)),)
-    scene = crank_rocker(motion=Motion(radians(90.0), 0.0), effects=effects)
+    scene = crank_rocker(Motion(radians(90.0), 0.0), effects=effects)
     there = solve(scene, "position", at=command_at(scene, np.array([radians(65.0)])))
     near = find_positions(scene, "theta_4", float(there.theta_4[0]))
     assert near.angle.max() == approx(radians(65.0), abs=LOCATED)

@@ -115,7 +115,7 @@ class Drag(Effect):
 @mark.parametrize("speed", [-2.0, 2.0])
 def test_an_effect_that_copies_a_sign_keeps_its_derivatives(speed):
     def dragged(form, speed):
-        return crank_rocker(motion=Motion(1.0, speed), effects=(Drag(0.5, form),))
+        return crank_rocker(Motion(1.0, speed), effects=(Drag(0.5, form),))
 
     by_speed = sensitivity(dragged("copysign", speed)).of("torque", "motion.omega_2")
     ahead, behind = (

@@ -51,7 +51,7 @@ by 1/sqrt(2 N) = 0.016.
 def spread(*stated, samples=2048, seed=0, **motion):
     moving = {"theta_2": Sweep(0.3, 6.0, 6), "omega_2": 10.0} | motion
     free = {"loads": (), "effects": (), "tolerances": stated}
-    return tolerances(crank_rocker(motion=Motion(**moving), **free), samples, seed)
+    return tolerances(crank_rocker(Motion(**moving), **free), samples, seed)
 
 
 def test_a_number_that_the_torque_is_proportional_to():
@@ -75,7 +75,7 @@ def test_friction_at_rest_moves_what_it_holds_and_no_torque():
     stated = (Tolerance("effects.friction.O2", 0.01),)
     effects = Gravity(), Friction.at(O2=0.05)
     motion = Motion([0.4, 1.9], 0.0)
-    study = tolerances(crank_rocker(motion=motion, effects=effects, tolerances=stated))
+    study = tolerances(crank_rocker(motion, effects=effects, tolerances=stated))
     for name, width in (("torque", 0.0), ("torque_low", 0.01), ("torque_high", 0.01)):
         assert_allclose(study.spreads[name].worst, width, rtol=1e-9, atol=1e-12)
         sigma = study.spreads[name].deviation

@@ -19,7 +19,7 @@ from fourbar_validation.advise.worst_errors import (
 from fourbar_validation.engines.mujoco.trial import Trial
 from tests.support.scenes import crank_rocker
 
-SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))
+SCENE = crank_rocker(fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))
 COMMAND = fourbar.command(SCENE)
 
 

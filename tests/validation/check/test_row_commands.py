@@ -70,7 +70,7 @@ def commanding(bar, first, last, steps=8):
     sweep = Sweep(radians(first), radians(last), steps)
     names = (f"theta_{bar}", f"omega_{bar}", f"alpha_{bar}")
     motion = Motion(**dict(zip(names, (sweep, 2.0, -1.0), strict=True)))
-    return replace(crank_rocker(motion=motion), drive_bar=bar)
+    return replace(crank_rocker(motion), drive_bar=bar)
 
 
 def at_angles(angles):
@@ -109,7 +109,7 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
 
 def test_the_scenes_own_positions_may_be_listed_by_another_bar(judged):
     """The angles of the output are printed to a hundredth of a degree, twice a turn."""
-    scene = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 24), 10.0))
+    scene = crank_rocker(Motion(Sweep(0.0, 6.0, 24), 10.0))
     right = solve(scene)
     off = right.torque * (1.0 + 1e-9 * (np.arange(25) == 7))
     for torque, lines in ((right.torque, []), (off, [9])):
@@ -131,7 +131,7 @@ def test_rows_that_round_to_the_scenes_own_positions_are_at_them(
     name, form, shift, read
 ):
     """A sweep of steps of 20/3 deg, and times along a law; 47 deg is none of it."""
-    swept = crank_rocker(motion=Motion(Sweep(0.0, radians(120.0), 18), 10.0))
+    swept = crank_rocker(Motion(Sweep(0.0, radians(120.0), 18), 10.0))
     for scene in (swept, SERVO)[: 1 + (name == "time")]:
         right = solve(scene)
         places = np.degrees(right.theta_2)
@@ -242,7 +242,7 @@ torque | torque | torque | 1 | .15g
 }
 """Name of a column, what is in it, its heading, a factor and how it is written."""
 SERVO = crank_rocker(
-    motion=Motion(law=Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")),
+    Motion(law=Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg")),
     title="Servo",
 )
 
@@ -292,7 +292,7 @@ def test_rows_along_a_law_have_its_rates_at_their_own_times(names, said, read):
 @mark.parametrize("speed, start", [(3.0, 20.0), (-2.0, 80.0)])
 def test_rows_at_one_speed_are_found_by_their_time(speed, start, read):
     theta = np.radians([20.0, 35.0, 50.0, 80.0])
-    scene = crank_rocker(motion=Motion(theta.tolist(), speed))
+    scene = crank_rocker(Motion(theta.tolist(), speed))
     time = (theta - radians(start)) / speed
     judgement = Judgement(scene, read(write("time,torque", time, solve(scene).torque)))
     assert judgement.agreeing == 4 and judgement.digits >= "12"
@@ -310,7 +310,7 @@ def test_times_that_nobody_rounded_leave_all_digits(times, read):
 def test_rows_of_a_commanded_stroke_are_found_by_it_or_are_its_own(read, judged):
     """The angle by the triangle of O2 and both ends of the cylinder."""
     motion = Motion(stroke=Sweep(0.22, 0.28, 4), side="left")
-    scene = crank_rocker(motion=motion, drive=CYLINDER)
+    scene = crank_rocker(motion, drive=CYLINDER)
     far, near = (end.distance for _, end in CYLINDER.ends)
     stroke = np.array([0.28, 0.223, 0.25])
     cosine = (far * far + near * near - stroke * stroke) / (2.0 * far * near)
@@ -335,7 +335,7 @@ def test_a_table_without_an_angle_names_the_commanded_one(read):
 @mark.parametrize("decimals, rounded", [(1, True), (15, False)])
 def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, rounded, read):
     law = Sine(1.0, 0.5, 2.0 * pi, 1.0, 0.1 * pi)  # its peak: 0.2 s
-    scene = crank_rocker(motion=Motion(law=law))
+    scene = crank_rocker(Motion(law=law))
     times = np.array([0.05, 0.12, 0.22, 0.31, 0.47])
     theta, omega, alpha = law.at(times)
     at = at_angles(theta)._replace(speed=omega, acceleration=alpha)

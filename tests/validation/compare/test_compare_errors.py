@@ -22,7 +22,7 @@ from tests.support.rows import read_rows
 from tests.support.scenes import balance, crank_rocker
 
 POSITIONS = 40
-SCENE = crank_rocker(motion=Motion(Sweep(0.1, 5.9, POSITIONS - 1), 10.0, 5.0))
+SCENE = crank_rocker(Motion(Sweep(0.1, 5.9, POSITIONS - 1), 10.0, 5.0))
 FORMULAS = solve(SCENE)
 FIRST, MIDDLE, LAST = 0, 17, POSITIONS - 1
 

@@ -29,12 +29,12 @@ EXACT = [engine for engine in (*ENGINES, *load_further()) if not engine.through_
 def test_the_direction_of_a_line_is_as_uncertain_as_its_ends_are_near(engine, gap):
     if missing := engine.missing():
         skip(missing)
-    at = crank_rocker(motion=Motion(1.0))
+    at = crank_rocker(Motion(1.0))
     linkage, (theta_4,) = at.linkage, solve(at, "position").theta_4
     on_bar = linkage.ground + 0.2 * cis(theta_4 + 0.4 - linkage.ground_angle)
     near = Place(1, (abs(on_bar + gap), np.angle(on_bar + gap)))
     scene = crank_rocker(
-        motion=Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
+        Motion(1.0 + gap * np.linspace(-1.0, 1.0, 7), 10.0),
         drive=LinearDrive(near, Place(4, (0.2, 0.4))),
     )
     assert solve(scene, "position").stroke == approx(gap, rel=0.5)

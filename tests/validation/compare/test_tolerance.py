@@ -70,7 +70,7 @@ def test_what_is_no_number_uses_more_than_is_allowed(error, allowed, share):
 def test_conditions_of_several_quantities_are_those_of_their_units():
     """Of angles s, of rates s^2, of forces s^2 times the drive's; of the input 1."""
     scene = crank_rocker(
-        motion=fourbar.Motion(theta_3=np.linspace(0.7, 1.3, 5), omega_3=1.0),
+        fourbar.Motion(theta_3=np.linspace(0.7, 1.3, 5), omega_3=1.0),
         drive_bar=4,
     )
     s = fourbar.solve(scene)

@@ -99,7 +99,7 @@ def scene(*names):
     """
     terms = [ACTING[name] for name in names]
     return crank_rocker(
-        motion=fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * np.pi, 12), 10.0, 3.0),
+        fourbar.Motion(fourbar.Sweep(0.13, 0.13 + 2 * np.pi, 12), 10.0, 3.0),
         loads=tuple(term for term in terms if isinstance(term, Load)),
         effects=tuple(term for term in terms if not isinstance(term, Load)),
     )

@@ -203,7 +203,7 @@ def driven(one, other, branch, effects):
         5.0,
         branch,
     )
-    return crank_rocker(motion=motion, drive=drive, effects=effects)
+    return crank_rocker(motion, drive=drive, effects=effects)
 
 
 DRIVES, BRANCHES = (2, 3, 4), (1, -1)
@@ -445,7 +445,7 @@ def commanded(what, branch):
         names = (what, f"omega_{bar}", f"alpha_{bar}")
         driven = {"drive_bar": int(bar)}
     stated = dict(zip(names, COMMANDED[what], strict=True))
-    return crank_rocker(motion=Motion(**stated, side=side, branch=branch), **driven)
+    return crank_rocker(Motion(**stated, side=side, branch=branch), **driven)
 
 
 @each_engine

@@ -29,7 +29,7 @@ from tests.support.guests import end_guests
 from tests.support.rows import read_rows, refused
 from tests.support.scenes import crank_rocker
 
-SCENE = crank_rocker(motion=fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
+SCENE = crank_rocker(fourbar.Motion(fourbar.Sweep(0.1, 6.38, 8), 10.0), loads=())
 CLASS = """
 from fourbar_validation.engines.free_body import FreeBody
 

@@ -127,7 +127,7 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
 
     def power(bar):
         scene = crank_rocker(
-            motion=Motion(turn, 10.0),
+            Motion(turn, 10.0),
             loads=(),
             effects=(Gravity(), SPRING, Torsion.at(O4=(2.0, 1.9, 0.1))),
             drive_bar=bar,

@@ -40,10 +40,10 @@ TORQUE = '"torque": moments[0] - cross(r2, F32)'
 OFF = (TORQUE, '"torque": 1.01 * (moments[0] - cross(r2, F32))')
 SCRIPT = ROOT / "tests/support/plain_engine.mjs"
 TURN = Motion(Sweep(0.1, 6.38, 8), 10.0)
-SCENE = crank_rocker(motion=TURN, loads=())
-ROCKING = crank_rocker(motion=Motion(theta_4=Sweep(1.8, 2.5, 8), omega_4=3.0))
+SCENE = crank_rocker(TURN, loads=())
+ROCKING = crank_rocker(Motion(theta_4=Sweep(1.8, 2.5, 8), omega_4=3.0))
 STROKE = crank_rocker(
-    motion=Motion(stroke=Sweep(0.2, 0.3, 8), stroke_speed=0.2, side="left"),
+    Motion(stroke=Sweep(0.2, 0.3, 8), stroke_speed=0.2, side="left"),
     drive=CYLINDER,
 )
 
@@ -355,8 +355,7 @@ def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
 @mark.usefixtures("hosted")
 def test_a_guest_is_not_asked_for_what_its_hello_leaves_out(tmp_path):
     motion = Motion(theta_3=Sweep(0.4, 0.8, 8), omega_3=3.0)
-    rows = judged(crank_rocker(motion=motion), "OfAnyBar")["of any bar"]
-    assert rows["all"][0] == REFUSES
+    assert judged(crank_rocker(motion), "OfAnyBar")["of any bar"]["all"][0] == REFUSES
     loaded = judged(crank_rocker(), write_program(tmp_path, "plain"))["plain"]
     refusal = "the engine's hello does not list loads in effects"
     assert loaded["all"] == (REFUSES, refusal)
@@ -390,7 +389,7 @@ def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     longest = "fourbar_validation.run.released.LONGEST_OF_A_GUEST"
     monkeypatch.setattr(longest, 1e-3)  # MuJoCo's here
     motion = Motion(1.0, 2.0, free=fourbar.Free(0.2, 10))
-    by_engine = judged(crank_rocker(motion=motion, loads=()), "Releases", "Right")
+    by_engine = judged(crank_rocker(motion, loads=()), "Releases", "Right")
     released, right = by_engine["releases"], by_engine["right"]
     assert verdicts(released) | verdicts(right) <= {AGREES, DEGRADED}
     assert {"theta_2", "omega_2", "energy", "F12"} <= released.keys()
@@ -551,7 +550,7 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
     outside = guests.GuestClient(engine.name, program, guests.ask_hello(program))
     inside = engine.start()
     answered = 0
-    scenes = [SCENE, crank_rocker(motion=TURN)]
+    scenes = [SCENE, crank_rocker(TURN)]
     if not engine.through_time:
         scenes += [STROKE, ROCKING]
     for scene in scenes:

@@ -193,7 +193,7 @@ def test_an_answer_comes_back_with_all_that_it_says():
         assert_equal(getattr(back, name), value)
 
 
-THREE = crank_rocker(motion=fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
+THREE = crank_rocker(fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
 
 
 def read_answer(data):

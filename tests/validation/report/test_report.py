@@ -60,7 +60,7 @@ COMMENT_LIMIT = 65_536
 """Characters of a comment on GitHub."""
 
 
-SCENE = crank_rocker(motion=Motion(Sweep(0.0, 6.0, 36), 5.0))
+SCENE = crank_rocker(Motion(Sweep(0.0, 6.0, 36), 5.0))
 SOLUTION = fourbar.solve(SCENE, "force")
 
 
@@ -200,7 +200,7 @@ def test_the_times_of_engines_are_those_of_the_run():
     ids=["positions", "one position", "released", "sweep"],
 )
 def test_every_kind_of_scene_is_drawn(motion, pictures, drawn):
-    made = judge_for_report("kind", crank_rocker(motion=motion), [FREE_BODY])
+    made = judge_for_report("kind", crank_rocker(motion), [FREE_BODY])
     assert made.figure.count("<svg") == pictures and made.drawn == drawn
     assert "kind: crank-rocker" in report([made])[1]
 

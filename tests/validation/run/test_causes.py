@@ -48,7 +48,7 @@ from tests.support.here import list_failed, summary_of
 from tests.support.scenes import WEIGHT, crank_rocker, recommand, relink
 from tests.support.texts import put
 
-SCENE = crank_rocker(motion=Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
+SCENE = crank_rocker(Motion(Sweep(0.1, 6.0, 30), 10.0, 5.0), loads=())
 CAPABILITIES = MODELS / "capabilities"
 SOLVER = PLAIN.partition("\nNAMES =")[0]
 TORQUE = '"torque": moments[0] - cross(r2, F32)'

@@ -194,7 +194,7 @@ def test_moments_about_far_centres_are_right_to_full_accuracy():
 
 
 def judge_law(law):
-    (row,) = check_law(make_question("law", crank_rocker(motion=Motion(law=law)), ()))
+    (row,) = check_law(make_question("law", crank_rocker(Motion(law=law)), ()))
     return row
 
 

@@ -63,11 +63,11 @@ SCENES = {
         loads=LOADS, drive=PointDrive(Place(3, (0.1, 0.2)), 1.1, "bar")
     ),
     "bar 4 commanded": crank_rocker(
-        motion=Motion(theta_4=Sweep(2.3, 2.8, 12), omega_4=2.0),
+        Motion(theta_4=Sweep(2.3, 2.8, 12), omega_4=2.0),
         loads=LOADS,
     ),
     "bar 3 commanded": crank_rocker(
-        motion=Motion(theta_3=Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1),
+        Motion(theta_3=Sweep(0.4, 0.7, 12), omega_3=-2.0, branch=-1),
         loads=LOADS,
     ),
 }
@@ -112,7 +112,7 @@ def test_a_scene_has_the_same_numbers_however_it_is_stated(name):
             ],
         ),
         (
-            crank_rocker(motion=Motion(np.array([0.1, 0.2]))),
+            crank_rocker(Motion(np.array([0.1, 0.2]))),
             ["scenes stated otherwise: the scene states positions only"],
         ),
     ],

@@ -54,7 +54,7 @@ from tests.validation.run.test_judge import rows_of
 
 EXACT = tuple(w for w in HARD_ENGINES if not w.through_time)
 AT_CHANGE_POINTS = dict(families.approach_change_point(distances=(1e-2, 1e-8)))
-SWEEP = crank_rocker(motion=Motion(Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
+SWEEP = crank_rocker(Motion(Sweep(0.1, 0.1 + 2 * math.pi, 30), 10.0))
 
 
 def take_last(family):

@@ -21,7 +21,7 @@ from tests.support.rows import read_rows
 from tests.support.scenes import WEIGHT, bare, crank_rocker
 from tests.support.texts import COORDINATES
 
-SCENE = crank_rocker(motion=Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=WEIGHT)
+SCENE = crank_rocker(Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=WEIGHT)
 DEGREES = np.linspace(0.0, 360.0, 121)
 LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
@@ -62,7 +62,7 @@ def test_curves_are_columns_in_the_unit_of_their_axis(figure, name, column):
 @mark.slow
 def test_what_a_clipped_axis_leaves_out_is_a_pure_number():
     """A ratio has no prefix: a thousand is no "k1"."""
-    scene = crank_rocker(motion=Motion(Sweep(0.0, 2.0 * np.pi, 3601), 10.0))
+    scene = crank_rocker(Motion(Sweep(0.0, 2.0 * np.pi, 3601), 10.0))
     caption = draw_figure(scene, "ratios").figure.subfigs[0].get_supxlabel()
     assert re.search(
         r"clipped at [\d.]+; the largest evaluated, T₄/T₂ = −?\d{4,}",
@@ -123,7 +123,7 @@ def test_the_whole_circuit_is_traced_without_a_corner_and_drawn():
 
 def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s():
     points = Point("P", 3, (0.1, 0.7)), Point("Q", 4, (0.1, 0.0))
-    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.4, 3), 10.0), points=points)
+    scene = crank_rocker(Motion(Sweep(0.2, 1.4, 3), 10.0), points=points)
     view = make_view(scene)
     path = join(view.trace().points["P"])
     assert not view.goes_round
@@ -137,7 +137,7 @@ def test_a_stated_sweep_keeps_its_ends_and_a_point_of_the_output_is_no_coupler_s
 def test_a_falling_sweep_is_drawn_with_the_turns_of_its_own_order():
     """theta_4 passes -180 deg on the way."""
     scene = crank_rocker(
-        linkage=bare(0.3, 0.1, 0.25, 0.22, 1.0), motion=Motion(Sweep(4.5, 1.5, 9), 1.0)
+        Motion(Sweep(4.5, 1.5, 9), 1.0), linkage=bare(0.3, 0.1, 0.25, 0.22, 1.0)
     )
     drawn = make_view(scene).sweep.theta_4[::-1]
     assert drawn == approx(solve(scene).theta_4) and drawn[-1] < -np.pi < drawn[0]
@@ -155,7 +155,7 @@ def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
 def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
     friction = Friction.at(O2=2.0)
     turn = Motion(Sweep(0.0, 2.0 * np.pi, 200), 0.0)
-    view = make_view(crank_rocker(motion=turn, drive_bar=4, effects=(friction,)))
+    view = make_view(crank_rocker(turn, drive_bar=4, effects=(friction,)))
     draw_chart(Figure().subplots(), view, CHARTS["drive"])
     assert re.search(r"evaluated, torque_(low|high)\s=\s", view.notes[-1])
 
@@ -163,5 +163,5 @@ def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
 @mark.parametrize("acceleration, lines", [(0.0, 3), (3.0, 1)])
 def test_a_start_is_no_range_that_friction_holds(acceleration, lines):
     rest = Motion(Sweep(0.5, 1.5, 20), 0.0, acceleration)
-    view = make_view(crank_rocker(motion=rest, effects=(Friction.at(O2=2.0),)))
+    view = make_view(crank_rocker(rest, effects=(Friction.at(O2=2.0),)))
     assert len(list_demand(view).curves) == lines

@@ -81,7 +81,7 @@ COMMANDS = {
 
 
 def commanding(motion):
-    return crank_rocker(motion=motion, drive=CYLINDER, effects=WEIGHT)
+    return crank_rocker(motion, drive=CYLINDER, effects=WEIGHT)
 
 
 def released(steps=300, duration=0.6, **changes):
@@ -93,7 +93,7 @@ def released(steps=300, duration=0.6, **changes):
 
 def by_law():
     law = Law((0.0, 1.0, 2.0), (0.3, 2.0, 1.0), ends="rest")
-    return crank_rocker(motion=Motion(law=law), drive_bar=4)
+    return crank_rocker(Motion(law=law), drive_bar=4)
 
 
 @cache
@@ -324,7 +324,7 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
 def test_the_largest_of_what_is_clipped_may_be_commanded():
     """The law turns bar 2 by 1 rad in 10 ms, the others turn less."""
     law = Law((0.0, 1.0, 1.01, 3.0), (0.1, 0.2, 1.2, 1.3), omega_2=(0.0,) * 4)
-    figure = composed(crank_rocker(motion=Motion(law=law)), "kinematics")
+    figure = composed(crank_rocker(Motion(law=law)), "kinematics")
     words = " ".join(text.get_text() for text in figure.findobj(Text))
     assert "the largest evaluated, ω2\xa0=" in words.replace("\n", " ")
 
@@ -394,7 +394,7 @@ def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_mome
 def test_what_stands_at_an_axis_is_whole():
     """A name that is too long for three columns, a power of ten, and a place at 0."""
     points = tuple(Point(30 * name, 3, (0.1, 0.7)) for name in "PQR")
-    scene = crank_rocker(motion=Motion(Sweep(-1.0, 1.0, 20), 1e-4), points=points)
+    scene = crank_rocker(Motion(Sweep(-1.0, 1.0, 20), 1e-4), points=points)
     figure = composed(scene, "overview")
     for axes in figure.axes:
         if (legend := axes.get_legend()) is not None:
@@ -435,7 +435,7 @@ def test_a_pole_is_dotted_where_it_is_and_what_grows_has_no_ring(
     figure, quantity, rings
 ):
     """The power stays bounded where the output, which is driven, stands still."""
-    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.5, 5), 10.0), drive_bar=4)
+    scene = crank_rocker(Motion(Sweep(0.2, 1.5, 5), 10.0), drive_bar=4)
     panels = composed(scene, figure).axes
     (panel,) = (axes for axes in panels if axes.get_title("left").startswith(quantity))
     crossed = [line.get_xdata() for line in panel.lines if len(line.get_xdata()) == 2]
@@ -468,7 +468,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
 def test_what_dry_friction_holds_is_drawn_about_the_torque():
     """0.5 N m at O2, to either side."""
     held = (Gravity(), Friction.at(O2=0.5))
-    scene = crank_rocker(motion=Motion(Sweep(0.2, 1.4, 5), 0.0), effects=held)
+    scene = crank_rocker(Motion(Sweep(0.2, 1.4, 5), 0.0), effects=held)
     (panel,) = composed(scene, "torque").axes
     _, torque, low, high, *_ = (line.get_ydata() for line in panel.lines)
     half = 0.5 * torque[0] / solved(scene).torque[0]
@@ -491,7 +491,7 @@ def test_the_position_drawn_is_clear_of_poles_of_its_own_branch():
 OTHERS = {
     "crank-rocker": CRANK_ROCKER,
     "cylinder": commanding(COMMANDS["stroke (mm)"]),
-    "without speed": crank_rocker(motion=Motion(Sweep(0.0, 6.0, 30))),
+    "without speed": crank_rocker(Motion(Sweep(0.0, 6.0, 30))),
     "law": by_law(),
     "release": released(),
     "three rockers": thesis(),

@@ -44,8 +44,8 @@ def test_everything_that_acts_has_a_symbol(everything):
     for key in list_kinds():
         assert {"springs": "spring"}.get(key, key) in kinds
     assert kinds.count("force") == 2 and kinds[0] == "drive"
-    released = crank_rocker(motion=Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
-    for scene in (released, crank_rocker(motion=Motion(0.5))):
+    released = crank_rocker(Motion(0.5, 0.0, free=fourbar.Free(0.5, 4)))
+    for scene in (released, crank_rocker(Motion(0.5))):
         assert "drive" not in [symbol.kind for symbol in list_acting(scene)]
 
 
