@@ -69,8 +69,7 @@ def find_gap(pins):
     here = solve(scene, "position")
     found = [complex(*here[name][0]) for name in ("A", "B")]
     gap = max(abs(found[0] - (A - O2)), abs(found[1] - (B - O2)))
-    size = max(scene.linkage.lengths)
-    return gap * float(here.condition[0]) / (EPS * size)
+    return gap * float(here.condition[0]) / (EPS * max(scene.linkage.lengths))
 
 
 DRAWINGS = int(os.environ.get("DRAWINGS", "1000"))

@@ -54,8 +54,7 @@ def test_a_force_beside_B_has_its_moment_there(beside):
     Then b u3 x F32 is the moment about B: force times arm.
     """
     b, direction = 0.25, 0.3
-    coupler = Bar(b, centre=(0.0, 0.0))
-    link = replace(bare(0.3, 0.1, b, 0.22), coupler=coupler)
+    link = replace(bare(0.3, 0.1, b, 0.22), coupler=Bar(b, centre=(0.0, 0.0)))
     load = Load(3, (1.0, direction), from_centre=(b + beside, 0.0), frame="bar")
     s = solve(Scene(link, Motion(np.linspace(0.1, 6.0, 7), 0.0), 4, (load,)))
     arm = (b + beside) - b  # exact: as the doubles have it

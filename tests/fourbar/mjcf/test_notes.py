@@ -61,13 +61,12 @@ def acted_on(**changes):
 
     A load of each kind on each bar, and the drive is on bar 4.
     """
-    spring = Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02)
     effects = (
         Gravity(),
         Viscous.at(O2=0.02, B=0.03),
         Friction.at(A=0.01),
         Torsion.at(O4=(0.5, 0.2, 0.1)),
-        Springs((spring,)),
+        Springs((Spring(Place(1, (0.1, -1.5)), Place(3, (0.08, 0.3)), 200.0, 0.02),)),
         Flywheel(0.02, 4),
     )
     loads = (

@@ -569,10 +569,9 @@ def test_what_is_held_or_moved_across_a_pole_has_no_bound():
 
 def test_a_release_that_stops_says_when_and_where():
     """A flywheel of 0.5 kg m^2 under 2 N m: 1 rad/s lasts 0.25 s, over 1/8 rad."""
-    motion = Motion(0.3, 1.0, free=Free(1.0, 50))
     stopped = Scene(
         bare(0.1, 0.25, 0.3, 0.28),
-        motion,
+        Motion(0.3, 1.0, free=Free(1.0, 50)),
         effects=(Flywheel(0.5), Friction.at(O2=2.0)),
     )
     stop = f"at rest from t = 0.25 s on, at theta_2 = {np.degrees(0.425):.4g} deg;"

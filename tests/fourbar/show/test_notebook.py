@@ -34,8 +34,7 @@ STUDY = vary(LOOSE, {"lengths.input": np.array([0.1, 0.11, 3.0])})
 def test_a_scene_shows_itself():
     shown = thesis()._repr_html_()
     picture = shown.partition("data:image/svg+xml;base64,")[2].partition('"')[0]
-    drawn = thesis().plot("linkage")._repr_svg_()
-    assert b64decode(picture).decode() == drawn
+    assert b64decode(picture).decode() == thesis().plot("linkage")._repr_svg_()
     assert "triple rocker" in shown
     assert unescape(shown.partition("<pre>")[2]) == f"{dump(thesis())}</pre>"
     assert HOSTILE not in replace(thesis(), title=HOSTILE)._repr_html_()

@@ -95,8 +95,7 @@ def test_a_crank_that_turns_is_pulled_by_its_own_mass_and_bent_by_its_inertia():
     N = 3.0 * 20.0**2 * (0.1**2 - x**2) / (2.0 * 0.1)
     assert_allclose(internal.N[0], N, rtol=ROUNDED)
     assert np.abs(internal.M).max() < 1e-13
-    wheel = Flywheel(0.02)
-    starting = Scene(linkage, Motion(1.0, 0.0, 50.0), effects=(wheel,))
+    starting = Scene(linkage, Motion(1.0, 0.0, 50.0), effects=(Flywheel(0.02),))
     internal = solved(starting, 2, x)
     assert internal.M[0, 0] == approx(1.0 - solve(starting).torque[0])
     m = 3.0 * 50.0 / 0.1

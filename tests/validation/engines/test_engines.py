@@ -492,13 +492,12 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
 ):
     motion = Motion(np.array([theta_2]), 3.0, 2.0)
     for arms, jams in ((r, False), (50.0, True)):
-        friction = PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))
         case = Scene(
             UNIFORM,
             motion,
             drive,
             (),
-            (Gravity(), friction),
+            (Gravity(), PinFriction.at(**dict.fromkeys(("A", "B", "O4"), (mu, arms)))),
         )
         engine, bodies = (
             answered(name, case).quantities["torque"][0]

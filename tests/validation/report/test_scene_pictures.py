@@ -63,10 +63,9 @@ def test_no_mark_stands_where_nothing_is_judged():
 def test_marks_stand_at_the_positions_of_their_engine():
     """An engine of the second half of a turn has no mark before its middle."""
     at = command(PLAIN)
-    half = slice(len(at.angle) // 2, None)
     whole_turn, half_turn = (
         sorted(list_marks(PLAIN, WHOLE, WHOLE.torque[part], at.part(part)))
-        for part in (slice(None), half)
+        for part in (slice(None), slice(len(at.angle) // 2, None))
     )
     x = [x for x, _ in whole_turn]
     middle = 0.5 * (x[0] + x[-1])

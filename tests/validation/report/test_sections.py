@@ -80,8 +80,7 @@ def test_hard_cases_and_studies_beside_the_report_are_linked(tmp_path):
     pages = ["hard/report.html", "cost/a/cost.md", "cost/b/cost.md"]
     for page in pages:
         (tmp_path / page).touch()
-    sections = collect_sections(None, tmp_path)
-    text = write_html(summary_of([]), {}, sections=sections)
+    text = write_html(summary_of([]), {}, sections=collect_sections(None, tmp_path))
     assert re.findall('href="((?:hard|cost)/[^"]+)"', text) == pages
 
 

@@ -364,8 +364,7 @@ def test_a_mistake_that_explains_less_than_nine_tenths_is_not_named(spoiled):
     """The other branch changes fewer than twenty quantities."""
 
     def take_other_branch(numbers, at):
-        other = at._replace(branch=-at.branch)
-        numbers |= FreeBody().answer(SCENE, other).quantities
+        numbers |= FreeBody().answer(SCENE, at._replace(branch=-at.branch)).quantities
         ripple = 1.0 + 0.1 * np.cos(np.arange(len(at.angle)) ** 2.0)
         for name in spoiled:
             numbers[name] = (numbers[name].T * ripple).T
