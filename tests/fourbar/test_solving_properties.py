@@ -39,9 +39,8 @@ from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.engines.exact import find_refusal
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, draw_linkage
+from tests.support.scenes import EPS, bare, draw_linkage
 
-EPS = 2.0**-52
 ROUNDINGS = {
     "position": (32.0, 1),
     "velocity": (32.0, 2),

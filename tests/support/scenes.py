@@ -24,6 +24,7 @@ from fourbar import (
 )
 from tests.support.checkout import ROOT
 
+EPS = 2.0**-52
 CRANK_ROCKER_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 PARALLELOGRAM = (0.3, 0.1, 0.3, 0.1)
 UNIFORM = uniform(*CRANK_ROCKER_LENGTHS)

@@ -20,9 +20,8 @@ from fourbar.files import dump, loads
 from fourbar.mjcf.assembly import write_sdf, write_usd
 from fourbar.mjcf.plane import Plane
 from tests.support.rows import read_rows, refused, slow_but
-from tests.support.scenes import cis
+from tests.support.scenes import EPS, cis
 
-EPS = 2.0**-52
 K = 8.0
 """Roundings of four lengths, two angles and the triangle, each of a few eps of the
 longest bar.

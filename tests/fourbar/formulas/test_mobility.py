@@ -23,9 +23,8 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.linkage import MOVING_BARS, uniform
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, cis, draw_linkage
+from tests.support.scenes import EPS, bare, cis, draw_linkage
 
-EPS = 2.0**-52
 ANGLE = 8.0 * EPS
 """Rounding of a limit's angle: exact sums, then four roots, two products and an arc
 tangent, each 1/2 eps of the angle, and the sum with theta_1 and pi, 2 pi: 1/2 eps of

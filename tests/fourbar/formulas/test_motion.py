@@ -11,9 +11,7 @@ from pytest import approx, mark
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
-from tests.support.scenes import PARALLELOGRAM, bare, cis
-
-EPS = 2.0**-52
+from tests.support.scenes import EPS, PARALLELOGRAM, bare, cis
 
 
 def find_singular(position):

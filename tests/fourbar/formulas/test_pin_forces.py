@@ -26,9 +26,8 @@ from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.pin_forces import Wrenches, pin_forces
 from fourbar.linkage import PIN_FORCE, PINS
-from tests.support.scenes import TURN, WEIGHT, bare, crank_rocker
+from tests.support.scenes import EPS, TURN, WEIGHT, bare, crank_rocker
 
-EPS = 2.0**-52
 GROWN = 1e-13
 """Relative, divided by the drive's condition: two evaluations of some hundred roundings
 each.

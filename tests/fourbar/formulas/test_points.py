@@ -21,9 +21,7 @@ from fourbar.formulas.mobility import circuits, find_intervals
 from fourbar.formulas.path import compute_state
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows, refused
-from tests.support.scenes import bare, draw_linkage
-
-EPS = 2.0**-52
+from tests.support.scenes import EPS, bare, draw_linkage
 
 
 class Drawn(NamedTuple):

@@ -8,9 +8,8 @@ from fourbar.formulas.path import compute_state, drive_sine_of_triangle
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
 from tests.support.balls import move_in_balls
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, cis
+from tests.support.scenes import EPS, bare, cis
 
-EPS = 2.0**-52
 FEW_ROUNDINGS = 8.0 * EPS
 """Of 1 + |h3| + |h4|, which the coefficients are sums of; their slopes are quotients of
 these and h.

@@ -18,9 +18,8 @@ from fourbar import (
 )
 from tests.fourbar.test_solving_properties import ACTING, BODIES, embody
 from tests.support.balls import answer_in_balls
-from tests.support.scenes import draw_linkage
+from tests.support.scenes import EPS, draw_linkage
 
-EPS = 2.0**-52
 K = 200.0
 """eps/condition of the sum of absolute terms; two derivations of some hundred roundings
 each, over 7000 samples.

@@ -10,9 +10,8 @@ from fourbar import Motion, Scene, solve, transmission_extremes
 from fourbar.formulas.mobility import find_intervals
 from fourbar.show.derived import derive
 from tests.fourbar.formulas.test_points import random_positions
-from tests.support.scenes import cis, draw_linkage
+from tests.support.scenes import EPS, cis, draw_linkage
 
-EPS = 2.0**-52
 ANGLE = 16.0 * EPS
 """Rounding of an angle at B, rad: eight operations, and theta_2 itself; magnified by
 1/|sin mu|.

@@ -18,11 +18,10 @@ from fourbar_validation.engines.linear import solve_system
 from fourbar_validation.engines.sliding import continue_couples
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
-from tests.support.scenes import bare, crank_rocker
+from tests.support.scenes import EPS, bare, crank_rocker
 from tests.validation.engines.test_applied_effects import ACTING
 from tests.whole.test_imports import imported
 
-EPS = 2.0**-52
 DIGITS = 50.0 * EPS
 """Of the sum of the terms: an equation of some fifty roundings, evaluated in doubles.
 """

@@ -321,9 +321,9 @@ OF_MINE = Row(
 )
 
 
-def mine(**fields):
-    """Return OF_MINE with other fields."""
-    return replace(OF_MINE, **fields)
+def mine(quantity="torque", **fields):
+    """Return OF_MINE of a quantity, and with other fields."""
+    return replace(OF_MINE, quantity=quantity, **fields)
 
 
 def test_failures_are_one_line_an_engine_and_cause(printed):
@@ -364,7 +364,7 @@ def draw_answer(*rows, **numbers):
 @mark.slow
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
-    row = mine(quantity="F43", error=2.0, allowed=1e-6, verdict=FAILS)
+    row = mine("F43", error=2.0, allowed=1e-6, verdict=FAILS)
     largest = int(np.argmax(np.max(np.abs(SOLUTION.F43), axis=0)))
     drawn = draw_answer(row, torque=SOLUTION.torque, F43=-SOLUTION.F43)
     assert f"F43 {'xy'[largest]} (N)" in drawn and "allowed to mine" in drawn
@@ -373,15 +373,15 @@ def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     assert "allowed to mine" not in drawn
 
 
-RIGHT = [mine(quantity=name) for name in ("F12", "theta_3")]
-OPEN = mine(quantity="assembled", error=9.0, allowed=0.0, verdict=FAILS)
+RIGHT = [mine(name) for name in ("F12", "theta_3")]
+OPEN = mine("assembled", error=9.0, allowed=0.0, verdict=FAILS)
 DEAD = Row.unmeasured("a", "mine", "", "all", FAILS, "exit status 3 after 4 s")
 ALARM = Row.unmeasured("a", "mine", "", "watch", FAILS, "3 resets")
 UNKNOWN = "no known mistake explains it"
 CAUSES = [
     ([fail(OF_MINE)], f"torque differs, pin forces and motion agree; {UNKNOWN}"),
     (
-        [fail(mine(quantity="closure"))],
+        [fail(mine("closure"))],
         f"closure differs, pin forces and motion agree; {UNKNOWN}",
     ),
     (
@@ -390,11 +390,11 @@ CAUSES = [
         f" {UNKNOWN}",
     ),
     (
-        [fail(mine(quantity="torque_inertia"))],
+        [fail(mine("torque_inertia"))],
         f"inertial part of the torque differs, pin forces and motion agree; {UNKNOWN}",
     ),
     (
-        [fail(mine(quantity=name), 3e-8) for name in ("torque", "F32")],
+        [fail(mine(name), 3e-8) for name in ("torque", "F32")],
         "torque and pin forces differ, motion agrees: the first 7 digits agree",
     ),
     ([fail(OF_MINE, nan)], "no number for torque"),
@@ -420,9 +420,9 @@ def test_what_no_known_mistake_explains_is_told_by_what_differs_and_what_agrees(
 def test_what_differs_from_two_engines_is_listed_and_shown_first():
     """The identity that fails with it has the larger error, and is a consequence."""
     rows = [
-        fail(mine(engine=FORMULAS, quantity="power"), 0.9),
+        fail(mine("power", engine=FORMULAS), 0.9),
         fail(mine(engine="one"), 0.3),
-        fail(mine(engine="one", quantity="torque_inertia"), 0.2),
+        fail(mine("torque_inertia", engine="one"), 0.2),
     ]
     against = {key: ["one", "two"] for key in ("torque", *PIN_FORCES, "theta_3")}
     (cause,) = summary_of_rows(*rows, against=against).causes
@@ -431,9 +431,9 @@ def test_what_differs_from_two_engines_is_listed_and_shown_first():
     assert cause.text == f"{words} torque, F12, F32, F43, F14, ..."
 
 
-BROKEN = fail(mine(engine=FORMULAS, quantity="force_sum"))
-ALONE = fail(mine(quantity="a_G3"), 0.5)
-NAMED = fail(mine(engine="named", quantity="F12"))
+BROKEN = fail(mine("force_sum", engine=FORMULAS))
+ALONE = fail(mine("a_G3"), 0.5)
+NAMED = fail(mine("F12", engine="named"))
 ALONE_TOO = replace(ALONE, engine="two")
 
 
@@ -445,7 +445,7 @@ ALONE_TOO = replace(ALONE, engine="two")
         ([fail(OF_MINE), BROKEN], {}, {FORMULAS}),
         ([fail(OF_MINE), replace(BROKEN, quantity="status")], {}, {FORMULAS, "mine"}),
         ([fail(OF_MINE), NAMED, BROKEN], {}, {FORMULAS, "named"}),
-        ([fail(mine(quantity="energy"))], {"F12": ["mine", "two"]}, {FORMULAS}),
+        ([fail(mine("energy"))], {"F12": ["mine", "two"]}, {FORMULAS}),
         ([OF_MINE], {}, {"mine"}),
         ([OF_MINE, ALONE_TOO, BROKEN], {}, {FORMULAS, "mine", "two"}),
     ],
@@ -463,9 +463,9 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
 
 def test_pin_forces_of_which_one_fails_do_not_agree():
     """Its row is fourbar's cause, as two other engines blame fourbar for it."""
-    wrong = (fail(mine(quantity=name)) for name in ("F12", "torque"))
+    wrong = (fail(mine(name)) for name in ("F12", "torque"))
     against = {"F12": ["one", "two"]}
-    summary = summary_of_rows(*wrong, mine(quantity="F14"), against=against)
+    summary = summary_of_rows(*wrong, mine("F14"), against=against)
     causes = {cause.engine: cause.text for cause in summary.causes}
     assert causes["mine"] == "torque differs; mistakes are not looked for there"
 
@@ -527,7 +527,7 @@ def test_an_engine_that_drew_nothing_is_not_in_the_caption_of_a_picture():
     ],
 )
 def test_what_was_not_compared_is_counted_by_its_reason(verdict, reason, kind):
-    row = mine(quantity="torque_inertia", verdict=verdict, reason=reason)
+    row = mine("torque_inertia", verdict=verdict, reason=reason)
     assert summary_of_rows(row).not_compared == {kind: 1}
 
 
@@ -555,13 +555,13 @@ def test_two_engines_must_compare_torque_and_all_pin_forces_of_a_scene(
     overview.listed = {"two": dict.fromkeys(["friction", "gravity", *DRIVES, "F12"])}
     for name, counts in (("a", (5, 5)), ("b", (5, 4)), ("c", (5, 0))):
         rows = [
-            mine(scene=name, engine=engine, quantity=quantity)
+            mine(quantity, scene=name, engine=engine)
             for engine, count in zip(("one", "two"), counts, strict=True)
             for quantity in ("torque", *PIN_FORCES)[:count]
         ]
         overview.add(replace(record_of(name, rows), needs=["gravity"]))
     needs = ["friction"]  # inertia alone is asked without it
-    bare = mine(scene="d", engine="two", quantity="drive_force_inertia")
+    bare = mine("drive_force_inertia", scene="d", engine="two")
     overview.add(replace(record_of("d", [bare]), needs=needs))
     assert "two lists friction: compared in no scene" in overview.notes
     assert overview.checked_twice == confirmed
@@ -591,6 +591,6 @@ def test_the_picture_shows_the_pin_force_that_fails():
     largest, other = max(sizes, key=sizes.get), min(sizes, key=sizes.get)
     numbers = {name: SOLUTION[name] for name in ("torque", *PIN_FORCES)}
     assert f">{largest} " in draw_answer(**numbers)
-    rows = fail(mine(quantity=other), error=0.5), fail(mine(quantity=largest))
+    rows = fail(mine(other), error=0.5), fail(mine(largest))
     drawn = draw_answer(*rows, **numbers)
     assert f">{other} " in drawn and f">{largest} " not in drawn
