@@ -3,7 +3,7 @@
 The loop is a quadratic, and all thirteen equations are solved.
 """
 
-import math
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,11 +18,8 @@ from fourbar_validation.compare.tolerance import EPS, RANDOM_WALK
 from fourbar_validation.engines.description import (
     SHARED_BY_EXACT_ENGINES,
     find_unknown,
-    list_speeds,
 )
-from fourbar_validation.engines.loop import make_blank
-
-BALL_ARITHMETIC = "ball-arithmetic"
+from fourbar_validation.engines.loop import read_each
 
 
 def find_refusal(scene: Scene) -> str:
@@ -33,7 +30,7 @@ def find_refusal(scene: Scene) -> str:
 class BallArithmetic:
     """Every compared quantity at each position, rounded once from 320 bits."""
 
-    name = BALL_ARITHMETIC
+    name = "ball-arithmetic"
 
     def answer(self, scene: Scene, command: Command) -> Answer:
         """Answer, or refuse by naming an effect that it does not know."""
@@ -42,31 +39,34 @@ class BallArithmetic:
         from fourbar_validation.engines.balls import compute_outputs, make_balls
 
         if reason := find_refusal(scene):
-            return Answer(BALL_ARITHMETIC, "exact", refusal=reason)
+            return Answer(self.name, "exact", refusal=reason)
         names = [
             q
             for q in COMPARED_QUANTITIES
             if command.omega_2 is not None or q.startswith("theta")
         ]
-        out = make_blank(len(command.theta_2), names)
-        assembled = np.zeros(len(command.theta_2), dtype=bool)
-        rates = list_speeds(command)
         stated = make_balls(scene, 0.0)
         remainder = arb(0 if command.remainder is None else command.remainder)
-        for i, (branch, *motion) in enumerate(
-            zip(command.branch, command.theta_2, *rates, strict=True)
-        ):
-            theta_2, omega, alpha = (arb(float(number)) for number in motion)
-            moved = {"theta_2": theta_2 + remainder, "omega_2": omega, "alpha_2": alpha}
-            values = compute_outputs(scene, int(branch), stated | moved)
-            if values is None:
-                continue
-            assembled[i] = True
-            for name, array in out.items():
-                axes = ("_x", "_y") if name in VECTORS else ("",)
-                array[i] = np.squeeze([_to_double(values.get(name + x)) for x in axes])
+
+        def read(
+            theta: float, branch: int, speed: float, acceleration: float
+        ) -> dict[str, Any] | None:
+            moved = {"theta_2": arb(theta) + remainder, "omega_2": arb(speed)}
+            moved["alpha_2"] = arb(acceleration)
+            balls = compute_outputs(scene, branch, stated | moved)
+            if balls is None:
+                return None
+            values: dict[str, Any] = {
+                name: float(ball.mid()) for name, ball in balls.items()
+            }
+            for name in VECTORS:
+                if f"{name}_x" in values:
+                    values[name] = values[f"{name}_x"], values[f"{name}_y"]
+            return values
+
+        out, assembled = read_each(command, names, read)
         return Answer(
-            BALL_ARITHMETIC,
+            self.name,
             "exact",
             at=command,
             assembled=assembled,
@@ -96,18 +96,16 @@ def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     ctx.prec = BITS
     x = make_ball_lengths(linkage)
     x["theta_1"] = arb(linkage.ground_angle)
-    sines = np.full(len(command.theta_2), np.nan)
-    for i, (theta_2, branch) in enumerate(
-        zip(command.theta_2.tolist(), command.branch.tolist(), strict=True)
-    ):
-        closed = compute_directions(x | {"theta_2": arb(theta_2)}, branch)
+
+    def read(theta: float, branch: int, *_: float) -> dict[str, float] | None:
+        closed = compute_directions(x | {"theta_2": arb(theta)}, branch)
+        if closed is None:
+            return None
         # bars 3 and 4 have no direction if A is on O4
-        sines[i] = (
-            math.nan
-            if closed is None
-            else np.nan_to_num(_to_double(wedge(*closed[1:])))
-        )
-    return sines
+        return {"sin_mu": np.nan_to_num(float(wedge(*closed[1:]).mid()))}
+
+    out, _ = read_each(command, ["sin_mu"], read)
+    return out["sin_mu"]
 
 
 def shift_to(
@@ -127,24 +125,13 @@ def shift_to(
     with mp.workdps(WORKING_DIGITS):
         d, a, b, c = map(mpf, linkage.lengths)
         theta_1 = mpf(linkage.ground_angle)
-        shifts = []
         cos_mu = mp.sqrt(max(1 - mpf(sin_mu) ** 2, 0))
-        for side in (2 * b * c * cos_mu, -2 * b * c * cos_mu):
-            cosine = (d * d + a * a - b * b - c * c + side) / (2 * a * d)
-            if abs(cosine) > 1:
-                continue
-            for sign in (1, -1):
+        nearest = mp.inf
+        for side, sign in product((2 * b * c, -2 * b * c), (1, -1)):
+            cosine = (d * d + a * a - b * b - c * c + side * cos_mu) / (2 * a * d)
+            if abs(cosine) <= 1:
                 shift = theta_1 + sign * mp.acos(cosine) - theta_2
-                turns = mp.nint(shift / (2 * mp.pi))
-                shifts.append(shift - 2 * mp.pi * turns)
-        nearest = min(shifts, key=abs, default=mp.inf)
+                shift -= 2 * mp.pi * mp.nint(shift / (2 * mp.pi))
+                nearest = min(nearest, shift, key=abs)
         largest = max(1.0, abs(theta_2), abs(linkage.ground_angle))
-        if abs(nearest) <= RANDOM_WALK * EPS * largest:
-            return nearest
-        return None
-
-
-def _to_double(ball: Any) -> float:
-    if ball is None:
-        return math.nan
-    return float(ball.mid())
+        return nearest if abs(nearest) <= RANDOM_WALK * EPS * largest else None

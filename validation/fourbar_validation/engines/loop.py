@@ -6,7 +6,7 @@ Every exact engine answers in this way.
 import cmath
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +34,8 @@ from fourbar_validation.engines.description import (
     reduce_angle,
 )
 from fourbar_validation.engines.free_body_closure import (
-    NEARLY_IN_LINE,
     NEWTON_STEPS,
+    compute_angle_between,
     find_angle,
 )
 from fourbar_validation.engines.loaded import Assembled, BarValues, Components, Loaded
@@ -125,8 +125,8 @@ class Assembler:
         first, second = self.closing
         angles = {
             bar: theta,
-            first: phi + branch * _compute_triangle_angle(e, near, far),
-            second: phi + math.pi - branch * _compute_triangle_angle(e, far, near),
+            first: phi + branch * float(compute_angle_between(e, near, far)),
+            second: phi + math.pi - branch * float(compute_angle_between(e, far, near)),
         }
         if bar == 4:
             angles[2] += math.pi
@@ -188,18 +188,6 @@ class Assembler:
         return math.hypot(x, y), ((b * y - d * x) / det, (c * x - a * y) / det)
 
 
-def _compute_triangle_angle(e: float, near: float, far: float) -> float:
-    """Compute the angle between the sides e and near, by half-angle tangents.
-
-    The corner is never on the side e, as for the free bodies.
-    """
-    above = (e - (near - far)) * (near + far - e)
-    below = (e + (near - far)) * (near + far + e)
-    angle = 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
-    least = NEARLY_IN_LINE * min(near, far) / near
-    return min(max(angle, least), math.pi - least)
-
-
 @dataclass(slots=True)
 class Exact:
     """An engine that answers each position by itself."""
@@ -238,11 +226,13 @@ class Exact:
         if bars.alone and moves:
             names.append(f"{name_driving(scene)}_inertia")
 
-        def read(
-            q: JointAngles,
-            speed: float,
-            acceleration: float,
-        ) -> BarValues:
+        position = Assembler(bars, command.bar)
+        gaps = [0.0]
+
+        def read(theta: float, branch: int, *rates: float) -> BarValues | None:
+            if position.find(theta, branch) is None:
+                return None
+            gaps.append(math.hypot(*bars.gap()))
             values: BarValues = dict(bars.positions())
             values["theta_3"] = theta_3 = bars.angle(3)
             values["theta_4"] = theta_4 = bars.angle(4)
@@ -250,10 +240,10 @@ class Exact:
             if input_follows:
                 values["theta_2"] = bars.angle(2)
             if moves:
-                values |= bars.move(command.bar, speed, acceleration)
+                values |= bars.move(command.bar, *rates)
             return values
 
-        out, assembled, gap = read_each(bars, command, names, read)
+        out, assembled = read_each(command, names, read)
         for name in ANGLES:  # continuous along the sweep
             out[name][assembled] = np.unwrap(out[name][assembled])
         return Answer(
@@ -262,47 +252,34 @@ class Exact:
             asked,
             assembled,
             out,
-            evidence={"closure_gap": gap},
+            evidence={"closure_gap": max(gaps)},
             shared=SHARED_BY_EXACT_ENGINES,
             own=bars.own,
             seconds=time.perf_counter() - start,
         )
 
 
-Read = Callable[[JointAngles, float, float], dict[str, Any]]
-"""Function of the bars' angles, and of speed and acceleration of the commanded bar,
-that returns values by name.
+Read = Callable[[float, int, float, float], Mapping[str, Any] | None]
+"""Function of angle, branch, speed and acceleration of the commanded bar that returns
+values by name, None where the loop does not close.
 """
 
 
 def read_each(
-    bars: Assembled,
-    command: Command,
-    names: Iterable[str],
-    read: Read,
-) -> tuple[dict[str, Array], Mask, float]:
-    """Read each position that assembles, NaN elsewhere.
-
-    Return that, where it assembles, and the greatest gap, m.
-    """
+    command: Command, names: Iterable[str], read: Read
+) -> tuple[dict[str, Array], Mask]:
+    """Read each position, NaN where there is no value; and where the loop closes."""
+    out = make_blank(len(command.angle), names)
+    closed = np.zeros(len(command.angle), dtype=bool)
     columns = command.angle, command.branch, *list_speeds(command)
-    missing: dict[str, Any] = {}
-    for name in names:
-        missing[name] = (math.nan, math.nan) if name in VECTORS else math.nan
-    rows = []
-    assembled = []
-    gap = 0.0
-    position = Assembler(bars, command.bar)
-    for theta, branch, *rates in zip(*(x.tolist() for x in columns), strict=True):
-        q = position.find(theta, branch)
-        values = missing
-        if q is not None:
-            gap = max(gap, math.hypot(*bars.gap()))
-            values = missing | read(q, *rates)
-        rows.append(values)
-        assembled.append(q is not None)
-    out = {name: np.array([row[name] for row in rows], float) for name in missing}
-    return out, np.array(assembled, bool), gap
+    positions = zip(*(column.tolist() for column in columns), strict=True)
+    for i, position in enumerate(positions):
+        values = read(*position)
+        if values is not None:
+            closed[i] = True
+            for name, array in out.items():
+                array[i] = values.get(name, math.nan)
+    return out, closed
 
 
 MADE = ("theta_2", "omega_2", "alpha_2")

@@ -13,15 +13,13 @@ one inverse dynamics tau(q, v, a), and the multipliers of
 """
 
 from collections.abc import Callable
-
-import numpy as np
+from typing import Any
 
 from fourbar.errors import LimitError
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.pins import state_from_pins
-from fourbar_validation.engines.description import list_speeds
-from fourbar_validation.engines.loop import Assembler
+from fourbar_validation.engines.loop import Assembler, read_each
 from fourbar_validation.engines.tree import Tree, solve_closed, solve_multipliers
 
 
@@ -44,21 +42,20 @@ class PlainLoop:
     def answer(self, command: Command) -> dict[str, Array]:
         """Return the torque, (n,), and the pin forces, (n, 2)."""
         tree = self.tree
-        n = len(command.theta_2)
-        torque = np.empty(n)
-        forces = {name: np.empty((n, 2)) for name in PIN_FORCES}
-        signed = with_signs(self.linkage, command)
-        columns = signed.theta_2, signed.branch, *list_speeds(command)
-        positions = zip(*(column.tolist() for column in columns), strict=True)
-        for row, (theta, branch, speed, acceleration) in enumerate(positions):
+
+        def read(
+            theta: float, branch: int, speed: float, acceleration: float
+        ) -> dict[str, Any]:
             if self.position.find(theta, branch) is None:
                 raise LimitError("the loop does not close at every position")
             jacobian = tree.jacobian()
             v = solve_closed(jacobian, speed)
             a = solve_closed(jacobian, acceleration, drift=tree.drift(v))
             tree.moving(v, a)
-            x, y, torque[row] = solve_multipliers(jacobian, self.drive, tree.torques())
-            forces["F43"][row] = x, y
-            for name, force in tree.forces(complex(x, y), torque[row]).items():
-                forces[name][row] = force
-        return {"torque": torque, **forces}
+            x, y, torque = solve_multipliers(jacobian, self.drive, tree.torques())
+            forces = tree.forces(complex(x, y), torque)
+            return {"torque": torque, "F43": (x, y), **forces}
+
+        signed = with_signs(self.linkage, command)
+        answered, _ = read_each(signed, ("torque", *PIN_FORCES), read)
+        return answered
