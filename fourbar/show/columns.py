@@ -19,7 +19,7 @@ from fourbar.errors import (
     names_other_mechanism,
 )
 from fourbar.quantities import STAGE_OF, Array, find_derived
-from fourbar.scene import Scene
+from fourbar.scene import Scene, command_at
 from fourbar.scene.scene import LimitOrigin
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.solution import (
@@ -250,11 +250,16 @@ def _ask_for_speed(scene: Scene, name: str) -> InputError:
 
 
 def _solve_at_unit_speed(solution: Solution) -> Solution:
-    """Solve the same positions with speed 1 of the bar that is commanded.
+    """Solve the same positions with speed 1 of the command.
 
-    Ratios of speeds exist at rest too.
+    Ratios of speeds exist at rest too. A released motion commands bar 2.
     """
-    at = solution.at._replace(speed=1.0, acceleration=0.0)
-    if not isinstance(at.origin, LimitOrigin):
-        at = at._replace(origin=None)
-    return solve(solution.scene, "velocity", at=at)
+    scene = solution.scene
+    at = solution.at
+    if at.moves_stroke:
+        motion = scene.motion.replace(speed=1.0, acceleration=0.0)
+        at = command_at(replace(scene, motion=motion), at.stated[0])
+    else:
+        origin = at.origin if isinstance(at.origin, LimitOrigin) else None
+        at = at._replace(speed=1.0, acceleration=0.0, origin=origin)
+    return solve(scene, "velocity", at=at)

@@ -90,6 +90,9 @@ def test_zeros_are_changes_of_sign_on_and_off_the_ends_of_panels(curve, zeros, e
 def test_a_panel_that_is_not_settled_exceeds_no_peak(frequency):
     """Of many equal peaks the settled ones are right to a part of 1e-9."""
 
-    edges = np.linspace(0.0, 0.7, 13)
-    panels = fit(lambda x: np.exp(0.5 * np.sin(frequency * x)), edges, "ranged")
+    panels = fit(
+        lambda x: np.exp(0.5 * np.sin(frequency * x)),
+        np.linspace(0.0, 0.7, 13),
+        "ranged",
+    )
     assert panels.find_peak("curve").value == approx(exp(0.5), rel=SETTLED)
