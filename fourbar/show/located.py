@@ -214,7 +214,9 @@ class _LocatedSearch:
         change = np.abs(after - before)[rows]
         left = np.abs(root.f_bracket[1] - root.f_bracket[0])
         steady = (root.f_x == 0.0) | (left <= JUMP * change)
-        return root.x[steady], root.x[~steady]
+        # at a pole itself there is no value
+        jumps = np.mean(root.bracket, axis=0)[~steady]
+        return root.x[steady], jumps
 
     def _drop_repeated(self, places: Array) -> Array:
         """Drop the positions that are an earlier one after whole turns."""

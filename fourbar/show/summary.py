@@ -243,8 +243,8 @@ class Facts:
             ends = places[run[0]], places[run[-1]]
             if len(run) > 1:  # a dwell lasts from one of a law's times to another
                 before, after = beside[run[0]], beside[run[-1] + 2]
-                starts = times[(before < times) & (times <= ends[0])]
-                stops = times[(ends[1] <= times) & (times < after)]
+                starts = times[(before <= times) & (times <= ends[0])]
+                stops = times[(ends[1] <= times) & (times <= after)]
                 ends = max([*starts], default=ends[0]), min([*stops], default=ends[1])
             ranges.append(HeldRange.of(ends, bounds[:, run]))
         return ranges

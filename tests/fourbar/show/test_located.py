@@ -10,10 +10,12 @@ from fourbar import (
     Free,
     InputError,
     Law,
+    Load,
     Motion,
     NotAssembledError,
     Place,
     Point,
+    PointDrive,
     Scene,
     Spring,
     Springs,
@@ -281,6 +283,15 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
     )
     with raises(NotAssembledError, match="jumps over it at time = 0 s, 1 s;"):
         locate(scene, "torque", "0.5 N m")
+
+
+def test_a_column_without_a_value_at_its_pole_jumps_there():
+    """At its dead point a force of constant power has no value, nor the other sign."""
+    drive = PointDrive(Place(3, (0.1, 0.2)), 0.5, "bar")
+    motion = Motion(Sweep(0.3, 2.9, 100), 2.0)
+    scene = crank_rocker(motion=motion, drive=drive, loads=(Load(2, moment=-1.0),))
+    with raises(NotAssembledError, match=r"theta_2 = [\d.]+ rad, and grows"):
+        locate(scene, "drive_force", "0 N")
 
 
 @mark.slow
