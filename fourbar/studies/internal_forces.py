@@ -27,7 +27,7 @@ from fourbar.scene import Scene
 from fourbar.solution import Solution
 
 _STATIONS = 41
-"""Equal stations from pin to pin, where none are given."""
+"""Equal stations, where none are given."""
 SAME_FOOT = 1e-9
 """Part of the bar's length within which two feet are one. A load and the inertia, both
 at G, differ by round-off.
@@ -79,7 +79,8 @@ def internal_forces(
     ----------
     solution : of the scene, up to the forces.
     bar : 2, 3 or 4.
-    stations : x, m, (k,); left out: 41 equal ones from pin to pin.
+    stations : x, m, (k,); left out: 41 equal ones from pin to pin, and beyond as far
+        as anything acts.
     """
     expect("scene", scene, Scene)
     expect("solution", solution, Solution)
@@ -90,13 +91,14 @@ def internal_forces(
         )
     if solution.theta_2.ndim != 1:
         raise InputError("solution", "a study", "must be of one scene: take one member")
-    described = scene.linkage.bar(bar)
-    x = np.linspace(0.0, described.length, _STATIONS)
+    beam = _collect_acting(scene, solution, bar)
+    first = np.nanmin(beam.foot, initial=0.0)
+    last = np.nanmax(beam.foot, initial=beam.length)
+    x = np.linspace(first, last, _STATIONS)
     if stations is not None:
         x = np.atleast_1d(
             require_numbers("stations", stations, "must be finite lengths", "m")
         )
-    beam = _collect_acting(scene, solution, bar)
     rows = np.broadcast_to(x, (len(solution), len(x)))
     return InternalForces(x, *beam.at(rows), beam.uniform, beam.find_largest())
 

@@ -219,7 +219,8 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     view.note_rest(solution)
     facts = Facts(solution)
     for column, (bar, worst) in zip(panels.T, facts.bending.items(), strict=True):
-        x = np.linspace(0.0, view.scene.linkage.bar(bar).length, STATIONS_DRAWN)
+        coarse = internal_forces(view.scene, worst.solution, bar).x
+        x = np.linspace(coarse[0], coarse[-1], STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))

@@ -83,6 +83,17 @@ def test_a_bar_that_hangs_in_its_pins_bends_by_its_own_weight(centre, eighths):
     assert internal.M[0, 20] == middle == internal.largest.moment[0]
 
 
+@mark.parametrize("end", [0.4, -0.1])
+def test_stations_reach_from_the_first_place_where_anything_acts_to_the_last(end):
+    """There nothing bends the bar; 100 N across it bend it at the pin before."""
+    load = Load(4, force=(100.0, math.pi / 2.0), from_pin=(end, 0.0), frame="bar")
+    internal = solved(Scene(MASSLESS, AT, loads=(load,)), 4)
+    assert [*internal.x[[0, -1]]] == [min(end, 0.0), max(end, 0.22)]
+    assert_allclose(internal.M[0, [0, -1]], 0.0, atol=100.0 * ROUNDED)
+    arm = max(end - 0.22, -end)
+    assert abs(internal.largest.moment[0]) == approx(100.0 * arm, rel=ROUNDED)
+
+
 def test_a_crank_that_turns_is_pulled_by_its_own_mass_and_bent_by_its_inertia():
     """N = m omega^2 (L^2 - x^2)/(2 L). Where it speeds up, the torque of the drive at
     O2, less what a flywheel takes, is the moment there, m L^2 alpha/3, and V falls to
