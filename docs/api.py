@@ -14,7 +14,10 @@ from fourbar.quantities import QUANTITIES, Quantities
 
 QUANTITY = {quantity.name: quantity for quantity in QUANTITIES}
 METHODS = {
-    "Solution": ("status", "assembled", "evaluated", "to_csv", "to_pandas"),
+    "Solution": (
+        *("title", "drive_bar", "origin", "status", "assembled", "evaluated"),
+        *("to_csv", "to_pandas"),
+    ),
     "Bar": ("moment_of_inertia",),
     "Motion": ("replace",),
     "Scene": ("plot",),

@@ -175,11 +175,11 @@ class InputError(FourBarError):
         file: str | None = None,
         unit: str | None = None,
     ) -> None:
-        self.key: str = key
-        self.value: object = value
-        self.allowed: str = allowed
-        self.file: str | None = file
-        self.unit: str | None = unit
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+        self.file = file
+        self.unit = unit
         # a reader wants 0.21, not np.float64(0.21); an interruption while numpy is
         # imported is one line too, so that this module does not import it
         numpy = sys.modules.get("numpy")

@@ -78,9 +78,9 @@ class Actions:
     def __init__(
         self, state: State, bodies: MovingBodies, impending: Number = 0
     ) -> None:
-        self.state: State = state
-        self.bodies: MovingBodies = bodies
-        self.impending: Number = impending
+        self.state = state
+        self.bodies = bodies
+        self.impending = impending
         self.forces: dict[int, Any] = {}
         """Resultants of the bars on which any acts, complex, N."""
         self.moments: dict[int, Any] = {}

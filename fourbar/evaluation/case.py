@@ -271,28 +271,27 @@ class Case(NamedTuple):
         """
         return cls.of(scene, bar, impending)._replace(drive_bar=bar, drive=None)
 
-    def begin_at(self, start: Command) -> "Case":
-        """Return a copy whose path-dependent effects begin at this position.
-
-        A study has a position for each linkage.
-        """
-        state = self.at(start)
-        return self._replace(
-            terms=tuple(term.begin_at(state, start.branch) for term in self.terms)
-        )
-
     def begin_with(self, motion: Command) -> "Case":
-        """Return a copy whose effects begin where a motion first assembles.
+        """Return a copy whose path-dependent effects begin where a motion assembles.
 
-        The case is returned as it is if the motion assembles nowhere or changes its
-        branch.
+        A study has a motion for each linkage, (m, n), which begins where that linkage
+        first assembles. The case is returned as it is if the motion assembles nowhere
+        or changes its branch.
         """
         half, _ = self.half_angle(motion)
         assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
         if not assembled.any() or np.ptp(motion.branch) != 0:
             return self
-        start = motion.part(int(np.argmax(assembled)))
-        return self.begin_at(start._replace(speed=0.0, acceleration=0.0))
+        first = np.argmax(assembled, axis=-1)
+        if first.ndim == 0:
+            start = motion.part(int(first))._replace(speed=0.0, acceleration=0.0)
+        else:
+            angle = np.take_along_axis(motion.angle, first[:, None], axis=1)
+            start = Command(angle, motion.branch[:, :1], 0.0, 0.0, motion.bar)
+        state = self.at(start)
+        return self._replace(
+            terms=tuple(term.begin_at(state, start.branch) for term in self.terms)
+        )
 
     def half_angle(self, at: Command) -> tuple[HalfAngle, Indices]:
         """Compute the half angles, and the indices of those in many digits."""

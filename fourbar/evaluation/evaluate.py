@@ -10,6 +10,7 @@ in numbers that round at most a thousandth as much as doubles.
 import cmath
 from collections.abc import Callable, Iterable, Set
 from functools import reduce
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from fourbar.quantities import (
     OK,
     OVERFLOW,
     PIN_FORCES,
+    RATES,
     SEVERAL,
     SINGULAR,
     STAGE_OF,
@@ -360,12 +362,7 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     "theta_4": lambda state: state.q if state.bar == 4 else angle(state.position.u4),
     "sin_mu": lambda state: state.position.sin_mu,
     "condition": lambda state: abs(state.sine),
-    "omega_2": lambda state: state.moving.omega_2,
-    "omega_3": lambda state: state.moving.omega_3,
-    "omega_4": lambda state: state.moving.omega_4,
-    "alpha_2": lambda state: state.moving.alpha_2,
-    "alpha_3": lambda state: state.moving.alpha_3,
-    "alpha_4": lambda state: state.moving.alpha_4,
+    **{name: attrgetter(f"moving.{name}") for name in RATES},
 }
 """Formulas of the scalars that come before the forces, by name."""
 POINT_VECTORS = frozenset(

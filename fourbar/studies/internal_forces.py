@@ -188,8 +188,19 @@ def _join(vectors: Array) -> ComplexArray:
     return vectors[:, 0] + 1j * vectors[:, 1]
 
 
-_Item = tuple[Any, Any, Any]
-"""Place from the first pin and force in the bar's axes, and couple."""
+class Acting(NamedTuple):
+    """A force or a couple on a bar, in the bar's axes."""
+
+    term: int
+    """Index of the load or effect, loads first; -1: the drive."""
+    pin: str
+    """Pin at which a couple acts between two bars; empty for anything else."""
+    place: Any
+    """Place from the bar's first pin, complex, m."""
+    force: Any
+    """Complex, N."""
+    couple: Any
+    """N m."""
 
 
 class _Recorder(Actions):
@@ -198,9 +209,15 @@ class _Recorder(Actions):
     def __init__(self, state: State, scene: Scene, bar: int) -> None:
         super().__init__(state, list_bodies(scene.linkage))
         self.bar, self.length = bar, scene.linkage.bar(bar).length
-        self.items: list[_Item] = []
+        self.items: list[Acting] = []
+        self.term = -1
+        """Index of what acts at present."""
         self.place: Any = 0.0j
         """Point in the bar's axes where a pure couple acts."""
+
+    def record(self, place: Any, force: Any, couple: Any, pin: str = "") -> None:
+        """Record a force or a couple in the bar's axes."""
+        self.items.append(Acting(self.term, pin, place, force, couple))
 
     def force(
         self,
@@ -213,19 +230,19 @@ class _Recorder(Actions):
         if bar == self.bar:
             back = np.conj(self.state.direction(bar))
             place = point if beyond is None else point + beyond * back
-            self.items.append((place, force * back, 0.0))
+            self.record(place, force * back, 0.0)
 
     def couple(self, bar: int, moment: Any) -> None:
         """Record a couple on the bar."""
         if bar == self.bar:
-            self.items.append((self.place, 0.0j, moment))
+            self.record(self.place, 0.0j, moment)
 
     def pin_couple(self, pin: str, couple: Any) -> None:
         """Record a couple between two bars at their pin."""
         if self.bar in PINS[pin]:
             place = 0.0j if pin == ENDS[self.bar][0] else self.length + 0.0j
             sign = 1.0 if self.bar == PINS[pin][1] else -1.0
-            self.items.append((place, 0.0j, sign * couple))
+            self.record(place, 0.0j, sign * couple, pin)
 
     def pull(self, start: Any, end: Any, force: Any) -> None:
         """Record both forces where they act.
@@ -235,6 +252,40 @@ class _Recorder(Actions):
         self.pull_ends(start, end, force)
 
 
+@np.errstate(all="ignore")
+def record_acting(
+    scene: Scene,
+    solution: Solution,
+    bar: int,
+    left_out: str = "",
+) -> _Recorder:
+    """Record what acts on a bar at each position, apart from its pins and its inertia.
+
+    `left_out`: key of an effect that is left out.
+    """
+    G = scene.linkage.bar(bar).to_centre
+    case = Case.of(scene, solution.at.bar).begin_with(solution.at)
+    state = case.at(solution.at)
+    recorder = _Recorder(state, scene, bar)
+    _record_drive(recorder, scene, solution)
+    pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
+    terms: tuple[Any, ...] = case.terms
+    for index, term in enumerate(terms):
+        if term.key == left_out:
+            continue
+        recorder.term = index
+        if term.key == "load" and term.bar == bar:
+            recorder.place = term.foot(G)
+            if term.arm is not None:
+                back = np.conj(state.direction(bar))
+                recorder.place = recorder.place + polar(*term.arm) * back
+        term.act(recorder, state)
+        recorder.place = 0.0j
+        term.act_known(recorder, pin_forces)
+    return recorder
+
+
+@np.errstate(all="ignore")
 def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
     """Collect all that acts on a bar."""
     described = scene.linkage.bar(bar)
@@ -243,61 +294,46 @@ def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
     zero = np.zeros(len(solution))
     omega = zero + getattr(solution, f"omega_{bar}")
     alpha = zero + getattr(solution, f"alpha_{bar}")
-    with np.errstate(all="ignore"):
-        case = Case.of(scene, solution.at.bar).begin_with(solution.at)
-        state = case.at(solution.at)
-        recorder = _Recorder(state, scene, bar)
-        _record_drive(recorder, scene, solution)
-        gravity = 0.0j
-        back = np.conj(state.direction(bar))
-        terms: tuple[Any, ...] = case.terms
-        pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
-        for term in terms:
-            if term.key == "gravity" and uniform:
-                gravity = gravity + term.field
-                continue
-            if term.key == "load" and term.bar == bar:
-                recorder.place = term.foot(G)
-                if term.arm is not None:
-                    recorder.place = recorder.place + polar(*term.arm) * back
-            term.act(recorder, state)
-            recorder.place = 0.0j
-            term.act_known(recorder, pin_forces)
-            if bar in term.added_inertia:  # a flywheel turns about the ground pin
-                recorder.couple(bar, -term.added_inertia[bar] * alpha)
-        pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
-        of_mass = -described.mass * (_join(getattr(solution, f"a_G{bar}")) - gravity)
-        inertial = [(G, of_mass * back, -described.moment_of_inertia * alpha)]
-        acting = recorder.items + _support(recorder, inertial, solution)
-        if not uniform:
-            acting += inertial
-        columns = []
-        for place, force, couple in acting:
-            # with the couple of a force beside the line
-            beside = couple + cross(-force, 1j * np.imag(place))
-            columns.append(np.broadcast_arrays(np.real(place), force, beside, zero))
-        foot, force, couple, _ = (
-            np.stack(column, axis=1) for column in zip(*columns, strict=True)
-        )
-        density = described.mass / described.length if uniform else 0.0
-        return _Beam(
-            described.length,
-            foot,
-            force,
-            couple,
-            uniform,
-            density,
-            (pull * back)[:, None],
-            omega[:, None],
-            alpha[:, None],
-        )
+    spread = "gravity" if uniform else ""
+    recorder = record_acting(scene, solution, bar, spread)
+    gravity = 0.0j
+    effects: tuple[Any, ...] = scene.effects
+    for effect in effects:
+        if effect.key == spread:
+            gravity = gravity + effect.field
+        if bar in effect.added_inertia:  # a flywheel turns about the ground pin
+            recorder.couple(bar, -effect.added_inertia[bar] * alpha)
+    back = np.conj(recorder.state.direction(bar))
+    pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
+    of_mass = -described.mass * (_join(getattr(solution, f"a_G{bar}")) - gravity)
+    of_inertia = -described.moment_of_inertia * alpha
+    recorder.record(G, of_mass * back, of_inertia)
+    supports = _support(recorder, solution)
+    if uniform:
+        recorder.items.pop()
+    columns = []
+    for _, _, place, force, couple in recorder.items + supports:
+        # with the couple of a force beside the line
+        beside = couple + cross(-force, 1j * np.imag(place))
+        columns.append(np.broadcast_arrays(np.real(place), force, beside, zero))
+    foot, force, couple, _ = (
+        np.stack(column, axis=1) for column in zip(*columns, strict=True)
+    )
+    density = described.mass / described.length if uniform else 0.0
+    return _Beam(
+        described.length,
+        foot,
+        force,
+        couple,
+        uniform,
+        density,
+        (pull * back)[:, None],
+        omega[:, None],
+        alpha[:, None],
+    )
 
 
-def _support(
-    recorder: _Recorder,
-    inertial: list[_Item],
-    solution: Solution,
-) -> list[_Item]:
+def _support(recorder: _Recorder, solution: Solution) -> list[Acting]:
     """Return the forces at both pins of a bar.
 
     Along the bar the pin forces of the solution are taken. Across it the reactions are
@@ -308,10 +344,7 @@ def _support(
     Beside a pole of the drive the part along a bar without drive may be any number of
     times larger than all that bends it. Its rounding must not enter M.
 
-    Parameters
-    ----------
-    recorder : with all else that acts on the bar.
-    inertial : weight and inertia that are not recorded, as if they acted at G.
+    `recorder`: with all else that acts on the bar, weight and inertia at G too.
     """
     back = np.conj(recorder.state.direction(recorder.bar))
     ends = (0.0, recorder.length)
@@ -321,10 +354,10 @@ def _support(
         sign = 1.0 if name[2] == str(recorder.bar) else -1.0
         along = (sign * _join(getattr(solution, name)) * back).real
         moments = 0.0
-        for place, acting, couple in [*recorder.items, *inertial]:
-            moments = moments + cross(place - x_other, acting) + couple
+        for _, _, place, force, couple in recorder.items:
+            moments = moments + cross(place - x_other, force) + couple
         across = np.where(np.isfinite(along), -moments / (x - x_other), np.nan)
-        supports.append((x, along + 1j * across, 0.0))
+        supports.append(Acting(-1, pin, x, along + 1j * across, 0.0))
     return supports
 
 

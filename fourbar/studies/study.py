@@ -74,18 +74,6 @@ class Study:
         scene = replace_numbers(self.scene, numbers)
         return Case.of(scene, self.at.bar, side).beside(self.scene)
 
-    def begin(self, case: Case, rows: slice) -> Case:
-        """Return the case of some members whose effects begin with their motions.
-
-        A motion begins where the member first assembles, and keeps its branch.
-        """
-        motion = take_positions(self.at, rows, slice(None))
-        half, _ = case.half_angle(motion)
-        assembled = (half.outer >= 0.0) & (half.inner >= 0.0)
-        first = np.argmax(assembled, axis=1)[:, None]
-        start = np.take_along_axis(motion.angle, first, axis=1)
-        return case.begin_at(Command(start, motion.branch[:, :1], 0.0, 0.0, motion.bar))
-
 
 def solve_some(
     study: Study,
@@ -105,7 +93,7 @@ def solve_some(
         for rows in split(m, max(1, results.block // n)):
             case = study.case(rows, side)
             if results.asks_forces and study.scene.counts_turns:
-                case = study.begin(case, rows)
+                case = case.begin_with(take_positions(study.at, rows, slice(None)))
             for columns in split(n, results.block):
                 positions = take_positions(at, rows, columns)
                 results.fill(case, positions, (rows, columns))

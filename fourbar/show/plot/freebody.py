@@ -4,11 +4,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fourbar.effects.effect import Actions, list_bodies
+from fourbar.effects.effect import list_bodies
 from fourbar.errors import InputError
-from fourbar.formulas.arithmetic import Number
-from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE, PINS
+from fourbar.linkage import BAR_NAMES, ENDS, FIRST_PIN, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import PIN_FORCES
+from fourbar.scene import Scene
 from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.linkage_figure import (
     draw_bar,
@@ -32,7 +32,7 @@ from fourbar.show.plot.view import View, where_in_words
 from fourbar.show.shown_units import choose_unit
 from fourbar.show.summary import Facts
 from fourbar.solution import Solution
-from fourbar.studies.internal_forces import internal_forces
+from fourbar.studies.internal_forces import internal_forces, record_acting
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,21 +69,19 @@ def _take_one(vector: Any) -> complex:
     return complex(np.ravel(vector)[0])
 
 
-class FreedBar(Actions):
+class FreedBar:
     """A bar freed from its pins at the drawn position, and what acts on it.
 
     With d'Alembert's forces and couples all add up to zero.
     """
 
     def __init__(self, view: View, bar: int) -> None:
-        super().__init__(view.state(), list_bodies(view.scene.linkage))
         self.bar = bar
         self.arrows: list[Arrow] = []
         self.turns: list[Couple] = []
-        self.name = ""
-        """Name of what acts."""
+        recorder = record_acting(view.scene, view.here, bar)
         described = view.scene.linkage.bar(bar)
-        u = self.state.direction(bar)
+        u = recorder.state.direction(bar)
         self.G = _take_one(described.to_centre * u)
         """Mass centre, from the bar's first pin, m."""
         first, second = ENDS[bar]
@@ -97,7 +95,14 @@ class FreedBar(Actions):
                 shown = f"F{of_pin[2]}{of_pin[1]}"
             colour = FORCE_COLOURS[of_pin]
             self.arrows.append(Arrow(write_force_name(shown), arm, force, colour))
-        self._add_actions(view)
+        names = _list_names(view.scene, bar)
+        for acting in recorder.items:
+            name = names[acting.term]
+            arm = _take_one(acting.place * u)
+            self.arrows.append(Arrow(name, arm, _take_one(acting.force * u)))
+            if acting.pin:
+                name += f" at {write_pin_name(acting.pin)}"
+            self.turns.append(Couple(name, _take_one(acting.couple).real))
         inertial = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
         text = rf"$-m_{bar}\,a_{{G{bar}}}$"
         self.arrows.append(Arrow(text, self.G, inertial, dashed=True))
@@ -107,63 +112,14 @@ class FreedBar(Actions):
         self.arrows = [arrow for arrow in self.arrows if arrow.force != 0.0]
         self.turns = [couple for couple in self.turns if couple.moment != 0.0]
 
-    def _add_actions(self, view: View) -> None:
-        """Add what the drive, loads and effects put on the bar."""
-        scene = view.scene.settled()
-        here = view.here
-        if scene.motion.free is None:
-            self.name = f"$T_{self.bar}$"
-            if scene.drive_bar == self.bar:
-                self.couple(self.bar, here.torque)
-            self.name = "$F$"
-            if scene.drive is not None:
-                scene.drive.act(self, here.drive_force)
-        for count, load in enumerate(scene.loads, start=1):
-            self.name = f"load {count}"
-            load.act(self, self.state)
-        forces = {name: getattr(here, name) for name in PIN_FORCE.values()}
-        for effect in scene.effects:
-            self.name = effect.key.replace("_", " ")
-            if effect.key == "gravity":
-                self.name = rf"$m_{self.bar}\,g$"
-            effect.act(self, self.state)
-            effect.act_known(self, forces)
 
-    def force(
-        self,
-        bar: int,
-        force: Number,
-        point: Number = 0.0j,
-        beyond: Number = None,
-    ) -> None:
-        """Add a force on a bar, at a point of its frame.
-
-        `beyond`: arm from there in world axes.
-        """
-        if bar != self.bar:
-            return
-        arm = point * self.state.direction(bar) + (0.0j if beyond is None else beyond)
-        self.arrows.append(Arrow(self.name, _take_one(arm), _take_one(force)))
-
-    def pull(self, start: Any, end: Any, force: Number) -> None:
-        """Add both forces, between neighbours too.
-
-        A freed bar shows each where it acts.
-        """
-        self.pull_ends(start, end, force)
-
-    def couple(self, bar: int, moment: Number, at: str = "") -> None:
-        """Add a pure couple on a bar, `at` a pin that its name says."""
-        if bar == self.bar:
-            self.turns.append(Couple(self.name + at, _take_one(moment).real))
-
-    def pin_couple(self, pin: str, couple: Number) -> None:
-        """Add a couple on the second of the two bars at a pin, N m, and name the pin.
-
-        The first bar gets the opposite couple.
-        """
-        for bar, sense in zip(PINS[pin], (-1.0, 1.0), strict=True):
-            self.couple(bar, sense * couple, f" at {write_pin_name(pin)}")
+def _list_names(scene: Scene, bar: int) -> list[str]:
+    """Name what acts on a bar: each load and effect, and at last the drive."""
+    names = [f"load {count}" for count, _ in enumerate(scene.loads, start=1)]
+    for effect in scene.effects:
+        name = effect.key.replace("_", " ")
+        names.append(rf"$m_{bar}\,g$" if name == "gravity" else name)
+    return [*names, f"$T_{bar}$" if scene.drive is None else "$F$"]
 
 
 def draw_free_bodies(figure: "SubFigure", view: View) -> None:
