@@ -38,7 +38,7 @@ from fourbar.quantities import (
 from fourbar.scene import Command, Scene, command, command_at
 from fourbar.scene.pictures import encode_picture
 from fourbar.show.derived import derive
-from fourbar.show.driving import find_starts, read_drive_demand
+from fourbar.show.driving import find_senses, read_drive_demand
 from fourbar.show.duty import compute_energies
 from fourbar.show.motion_curves import find_drive_rounding
 from fourbar.show.plot.film import write_film
@@ -293,8 +293,8 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
     if solution.F12 is not None:
         _drop_rounding(columns, PIN_FORCES)
         drive = read_drive_demand(solution)
-        senses = find_starts(solution)
-        for end in {*drive.keys[2:]} & columns.keys():  # a start is no range
+        senses, _ = find_senses(solution)
+        for end in {*drive.keys[2:]} & columns.keys():  # a start or stop is no range
             columns[end] = np.where(senses == 0.0, columns[end], np.nan)
         sizes = drive.sizes
         idle = sizes <= find_drive_rounding(solution)

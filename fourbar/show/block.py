@@ -418,12 +418,13 @@ class SceneBlock(Facts):
         if self.held and self.peak is not None:
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
-        if self.motion.started is not self.motion:
-            start = self.motion.start
-            row = self._write_growth(self.drive.keys.value, self.motion.started)
-            if start is not None:
-                value = self._value(start.value, self.drive.unit)
-                row = f"{value} at {self._place(start.place)}"
+        started = self.motion.started
+        start = self.motion.start
+        row = self._write_growth(self.drive.keys.value, *started)
+        if start is not None:
+            value = self._value(start.value, self.drive.unit)
+            row = f"{value} at {self._place(start.place)}"
+        if row and started[0] is not self.motion:
             yield _row("to start", f"{row}, against dry friction")
         yield from self._write_stroke()
         yield from self._write_power()
@@ -753,7 +754,7 @@ class SceneBlock(Facts):
         pins_from_rest = self._list_from_rest(PIN_FORCES, "N")
         if pins_from_rest or self._list_from_rest(_BENDING, "N m"):
             yield (
-                "to move: the largest as it begins to move, against the whole of dry "
+                "to move: the largest as it starts or stops, with the whole of dry "
                 "friction; the rows above take friction at rest as 0"
             )
         yield from self._warn()

@@ -63,25 +63,32 @@ def lacks_friction(solution: Solution) -> Any:
     return np.isfinite(high - low) & (low < high)
 
 
-def find_starts(solution: Solution) -> Array:
-    """Return the senses in which positions at rest start to move, (n,).
+def find_senses(solution: Solution) -> Array:
+    """Return the senses in which positions at rest start and come to rest, (2, n).
 
-    That of a position with dry friction is the sense of its acceleration, 1 or -1.
-    Elsewhere it is 0, and where that is the rounding with which a law ends.
+    A position with dry friction starts in the sense of its acceleration, 1 or -1. One
+    that follows on a motion the other way comes to rest by it, and starts only if the
+    next position moves its way; it then turns back, and else both senses are one. They
+    are 0 elsewhere, and where the acceleration is the rounding with which a law ends.
     """
-    at = solution.at
-    at_rest = lacks_friction(solution) & (at.speed == 0.0)
-    largest = float(np.nanmax(np.abs(at.acceleration), initial=0.0))
-    growth = drop_rounding(at.acceleration, largest)
-    return np.where(at_rest, np.sign(growth), 0.0)
+    speed: Any = solution.at.speed
+    acceleration = solution.at.acceleration
+    at_rest = lacks_friction(solution) & (speed == 0.0)
+    largest = float(np.nanmax(np.abs(acceleration), initial=0.0))
+    growth = drop_rounding(acceleration, largest)
+    starts = np.where(at_rest, np.sign(growth), 0.0)
+    moves = np.sign(speed) * np.ones(len(starts)) if at_rest.any() else starts
+    before, after = np.append(0.0, moves[:-1]), np.append(moves[1:], 0.0)
+    stops = np.where(before == -starts, before, starts)
+    return np.stack([np.where(after == starts, starts, stops), stops])
 
 
 def leaves_range(solution: Solution) -> Any:
     """Return where dry friction holds a pin and leaves the drive a range, (n,).
 
-    Nothing is held where a start has its acceleration.
+    Nothing is held where an acceleration starts or stops a motion.
     """
-    return lacks_friction(solution) & (find_starts(solution) == 0.0)
+    return lacks_friction(solution) & (find_senses(solution)[0] == 0.0)
 
 
 def name_places(solution: Solution) -> tuple[str, str]:

@@ -204,8 +204,10 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     kind = "torque" if solution.drive is None else "force"
     numbers: dict[str, Any] = dict.fromkeys(DUTY_UNITS)
     for name, curve in ((kind, drive.keys.value), ("power", "power")):
-        peak = (motion.started if name == kind else motion).find_peak(curve)
-        numbers[f"peak_{name}"] = peak and abs(peak.value)
+        ways = motion.started if name == kind else [motion]
+        peaks = [way.find_peak(curve) for way in ways]
+        largest = [abs(peak.value) for peak in peaks if peak]
+        numbers[f"peak_{name}"] = max(largest) if len(largest) == len(ways) else None
         numbers[f"rms_{name}"] = motion.find_rms(curve)
     fastest = motion.find_peak("speed")
     numbers["peak_speed"] = fastest and abs(fastest.value)

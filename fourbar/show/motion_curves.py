@@ -20,7 +20,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import (
-    find_starts,
+    find_senses,
     is_once_round,
     lacks_friction,
     read_drive_demand,
@@ -140,36 +140,43 @@ class MotionCurves:
         moves = solution.time is not None and np.any(solution.at.speed)
         if moves or not held.any():
             return [self]
-        if find_starts(solution)[held].all():
-            return [self.started]
-        return [self._begin(sense) for sense in (1.0, -1.0)]
+        senses = find_senses(solution)
+        if senses[0, held].all():
+            return self.started
+        return [
+            self._begin(np.where(of_each == 0.0, sense, of_each))
+            for sense, of_each in zip((1.0, -1.0), senses, strict=True)
+        ]
 
     @cached_property
-    def started(self) -> "MotionCurves":
-        """Curves of the motion where its accelerations start it from rest.
+    def started(self) -> "list[MotionCurves]":
+        """Curves of the motion where its accelerations start it from rest or stop it.
 
-        They work against the whole of dry friction. Along a law what stands beside an
-        instant at rest has it already, but beside a single instant nothing stands.
+        The whole of dry friction acts there, of a list that turns back in the one sense
+        or the other. Along a law what stands beside an instant at rest has it already,
+        but beside a single instant nothing stands.
         """
         solution = self.solution
+        senses = find_senses(solution)
         alone = solution.time is None or len(solution) == 1
-        return self._begin(0.0) if alone and find_starts(solution).any() else self
+        if not alone or not senses.any():
+            return [self]
+        turns_back = np.any(senses[0] != senses[1])
+        return list(map(self._begin, senses[: 1 + turns_back]))
 
-    def _begin(self, sense: float) -> "MotionCurves":
+    def _begin(self, senses: Array) -> "MotionCurves":
         """Return the curves with a beginning wherever the motion is at rest.
 
-        `sense`: of the speed where no acceleration says it; 0: nothing begins there.
+        `senses`: of the speed at each position, (n,); 0: nothing begins there.
         """
         scene = self.scene
         at = self.solution.at
+        begun: Any = _BEGINNING * senses
         if self.panels.located and scene.motion.law is None:
-            senses = np.sign(scene.motion.acceleration) or sense
-            motion = scene.motion.replace(speed=_BEGINNING * senses)
-            scene = replace(scene, motion=motion)
+            speed = begun[np.argmax(np.abs(begun))]
+            scene = replace(scene, motion=scene.motion.replace(speed=speed))
             at = command_at(scene, at.places)
         else:
-            senses = find_starts(self.solution)
-            begun = _BEGINNING * np.where(senses == 0.0, sense, senses)
             stated: Any = at.speed
             at = at._replace(speed=np.where(stated == 0.0, begun, stated))
         return describe_motion(solve(scene, at=at))
@@ -181,12 +188,14 @@ class MotionCurves:
         None if nothing starts, or if it grows without bound.
         """
         name = read_drive_demand(self.solution).keys.value
-        if self.started is self or self.panels.located:
-            return None if self.started is self else self.started.find_peak(name)
-        values = self.started.solution[name]
-        sizes = np.abs(values) * (find_starts(self.solution) != 0.0)
-        row = int(np.argmax(np.nan_to_num(sizes)))
-        return Peak(float(values[row]), float(self.solution.at.places[row]))
+        way = self.started[0]
+        if way is self or self.panels.located:
+            return None if way is self else way.find_peak(name)
+        at = self.solution.at
+        starts = find_senses(self.solution)[0] * at.acceleration > 0.0
+        values = way.solution[name]
+        row = int(np.argmax(np.nan_to_num(np.abs(values) * starts)))
+        return Peak(float(values[row]), float(at.places[row])) if starts[row] else None
 
     @property
     def is_steady(self) -> bool:
@@ -287,7 +296,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
         if scene.motion.law is not None:
             # what accelerates from rest bears what stands beside that instant
             at_edges = solve(scene, stage, at=command_at(scene, edges))
-            points = exact[~np.isin(exact, edges[find_starts(at_edges) != 0.0])]
+            points = exact[~np.isin(exact, edges[find_senses(at_edges)[0] != 0.0])]
         return fit_panels(compute, edges, most_halvings, points)
 
     positions = fit(_list_position_curves, "position", DEEP)

@@ -675,15 +675,28 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     assert "to move" not in block(crank_rocker(Motion(angle, 0.0)))
 
 
-def test_a_list_that_starts_and_moves_bears_the_friction_of_its_start():
-    creeping = Motion([0.2, 1.4], [1e-9, 2.0], [30.0, 0.0])
+@mark.parametrize(
+    "speeds, alpha, senses",
+    [
+        ([0.0, 2.0], [30.0, 0.0], [1.0]),
+        ([2.0, 0.0], [0.0, -30.0], [1.0]),
+        ([2.0, 0.0, -2.0], [0.0, -30.0, 0.0], [1.0, -1.0]),
+    ],
+)
+def test_a_list_bears_the_friction_of_its_start_and_stop(speeds, alpha, senses):
+    angles = np.linspace(0.2, 1.4, len(speeds))
     rubs = {"effects": (*WEIGHT, PinFriction.at(A=(0.3, 0.02)))}
-    creeps = solve(crank_rocker(creeping, **rubs))
-    starting = creeping.replace(omega_2=[0.0, 2.0])
-    lines = SceneBlock(solve(crank_rocker(starting, **rubs)), units("N")).write()
+    rests = Motion(angles, speeds, alpha)
+    facts = Facts(solve(crank_rocker(rests, **rubs)))
+    creeps = [np.where(rests.omega_2, speeds, 1e-9 * sense) for sense in senses]
+    ways = [solve(crank_rocker(rests.replace(omega_2=way), **rubs)) for way in creeps]
+    lines = SceneBlock(facts.solution, units("N")).write()
     row = next(line for line in lines if line.startswith("  to move"))
-    pins = [np.hypot(*creeps[name].T).max() for name in PIN_FORCES]
+    pins = [np.max([np.hypot(*way[name].T) for way in ways]) for name in PIN_FORCES]
     assert [float(size) for size in re.findall(r"\d[\d.]*", row)] == approx(pins, 2e-4)
+    torque = np.max(np.abs([way.torque for way in ways]))
+    assert facts.duty.peak_torque == approx(torque, rel=1e-6)
+    assert ("to start" in "".join(lines)) == (speeds[-1] != 0.0)
 
 
 def test_a_torque_that_friction_just_holds_is_zero_within_rounding():
