@@ -170,7 +170,7 @@ def find_files(name):
 
 ADDED = {
     "fourbar/quantities/__init__.py": "    v_A: Array",
-    "fourbar/evaluation/evaluate.py": '    "alpha_2": lambda',
+    "fourbar/evaluation/evaluate.py": '    "condition": lambda',
     "fourbar_validation/compare/scales.py": "        known |= motion.",
     "fourbar_validation/engines/balls.py": '    y |= {f"omega_{bar}"',
 }
