@@ -11,7 +11,7 @@ from pytest import fixture, mark
 import fourbar
 from fourbar_lab.families import FAMILY_DRAWERS
 from fourbar_lab.stability import judge_samples
-from fourbar_lab.tally import CHANCE, TOO_LARGE, TOO_SMALL, USELESS, is_by_chance
+from fourbar_lab.tally import CHANCE, TOO_LARGE, TOO_SMALL, USELESS, Tally, is_by_chance
 
 pytestmark = mark.slow  # random campaigns
 SAMPLES = 10
@@ -131,6 +131,13 @@ def test_error_bars_are_neither_too_small_nor_useless(tallies):
         assert max(tally.worst[bar][0] for tally in judged) <= TOO_SMALL
         useless = sum(tally.counts[f"{bar}{TOO_LARGE}"] for tally in judged)
         assert is_by_chance(useless, SAMPLES * families)
+
+
+def test_an_output_is_held_to_what_is_allowed_and_a_bar_to_ten_times():
+    tally = Tally()
+    for name, ratio in (("A_x", 1.0), ("A_y", 1.001), ("force_error", 10.0)):
+        tally.note(name, ratio, "a sample")
+    assert tally.list_beyond() == ["A_y"] and not tally.holds()
 
 
 def test_a_share_is_one_that_chance_explains():
