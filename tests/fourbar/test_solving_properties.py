@@ -183,7 +183,7 @@ def find_allowed(s, name, size):
     lengths, bar = s.scene.linkage.lengths, s.scene.motion.bar
     stage = STAGE_OF.get(name, "position")
     roundings, power = ROUNDINGS[stage]
-    speed, growth = (np.abs(s[f"{rate}_{bar}"]).max() for rate in ("omega", "alpha"))
+    speed, growth = (abs(s[f"{rate}_{bar}"]).max() for rate in ("omega", "alpha"))
     rate = {"position": 1.0, "velocity": speed, "acceleration": speed**2 + growth}
     reach = 1.0
     if STAGE_OF.get(name) is not None and s[name].ndim > 1:
@@ -209,7 +209,7 @@ def test_every_quantity_is_that_of_balls(name):
         if quantity.startswith("theta"):  # balls have no whole turns
             apart = np.remainder(apart + np.pi, tau) - np.pi
         apart, size = (
-            np.hypot(*values.T) if values.ndim > 1 else np.abs(values)
+            np.hypot(*values.T) if values.ndim > 1 else abs(values)
             for values in (apart, exact[quantity])
         )
         assert (apart <= find_allowed(s, quantity, size))[ok].all(), quantity

@@ -61,9 +61,9 @@ def internal_forces(question):
                 np.stack([getattr(piece, of) for piece in pieces], axis=1)
                 for of in (name, terms)
             )
-            error = divide(np.abs(getattr(forces, name) - theirs), size).max(axis=1)
+            error = divide(abs(getattr(forces, name) - theirs), size).max(axis=1)
             if name == "M":
-                beyond = np.abs(theirs).max(axis=1) - np.abs(forces.largest.moment)
+                beyond = abs(theirs).max(axis=1) - abs(forces.largest.moment)
                 error = np.maximum(error, divide(beyond, size.max(axis=1)))
             rows.append(
                 make_row(
@@ -125,14 +125,14 @@ class Piece(BodyWrenches):
             (lever.real - self.cut) * turned.imag - lever.imag * turned.real,
             0.0,
         )
-        self.pushing += np.abs(turned)
-        self.turning += np.abs(turned) * (np.abs(lever) + abs(self.cut))
+        self.pushing += abs(turned)
+        self.turning += abs(turned) * (abs(lever) + abs(self.cut))
 
     def couple(self, bar, couple):
         """Add a couple, to the piece on which its place lies."""
         if bar == self.bar:
             self.M += np.where(self.place > self.cut, couple, 0.0)
-            self.turning += np.abs(couple)
+            self.turning += abs(couple)
 
     def twist_at(self, pin, couple):
         """Add a couple between two bars at their pin."""

@@ -170,7 +170,7 @@ def _hold(scene, angle, branch):
     with np.errstate(all="ignore"):
         answer = free_body.FreeBody().answer(scene, command)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
-    sound = answer.assembled & (np.abs(sine) >= WELL_CONDITIONED)
+    sound = answer.assembled & (abs(sine) >= WELL_CONDITIONED)
     return np.where(sound, answer.quantities["torque"], np.nan)
 
 

@@ -49,7 +49,7 @@ def compare_points(question, scene, solution, reference, least=0.0):
             if name in ours:
                 theirs = stack_components(arm + at_foot)
                 terms = sum_lengths(link) if kind == "B" else sizes.sum_terms(kind)
-                size = np.abs(arm) + np.abs(at_foot) + terms
+                size = abs(arm) + abs(at_foot) + terms
                 apart = find_error(kind, ours[name], theirs, size)
                 apart *= find_condition(kind, link, reference)
                 apart = np.nan_to_num(apart, nan=np.inf)

@@ -305,9 +305,9 @@ def _compute_expected(scene):
         mean = (w * values).sum(axis=0)
         deviation = np.sqrt((w * (values - mean) ** 2).sum(axis=0))
         first_order = np.sqrt((variances * (slope * widths) ** 2).sum(axis=0))
-        bent = divide(np.abs(deviation - first_order), deviation)
-        bent = np.maximum(bent, divide(np.abs(mean), deviation) ** 2)
-        worst = np.abs(slope * widths * (1.0 + 2.0 * normal)).sum(axis=0)
+        bent = divide(abs(deviation - first_order), deviation)
+        bent = np.maximum(bent, divide(abs(mean), deviation) ** 2)
+        worst = abs(slope * widths * (1.0 + 2.0 * normal)).sum(axis=0)
         expected[part] = Expected(deviation, first_order, worst, bent)
     return expected
 
@@ -321,7 +321,7 @@ def _compute_off(spread, expected, slight):
         ("deviation", _NEARLY_STRAIGHT),
     ):
         theirs = getattr(expected, name)
-        apart = divide(np.abs(getattr(spread, name) - theirs), theirs)
+        apart = divide(abs(getattr(spread, name) - theirs), theirs)
         judged = (expected.bent <= most) & (expected.worst > slight)
         errors.append(np.where(judged, apart, 0.0))
     return np.max(errors, axis=0)

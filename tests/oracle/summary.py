@@ -205,8 +205,8 @@ class _SummaryJudge:
         Another value may exceed it; by how much is added too.
         """
         size = abs(peak.value)
-        self.add(row, np.abs(np.abs(at_peak) - size) / size)
-        self.add_excess(row, (np.abs(fine).max() - size) / size)
+        self.add(row, abs(abs(at_peak) - size) / size)
+        self.add_excess(row, (abs(fine).max() - size) / size)
 
     def add_excess(self, row, *excess):
         """Add the largest of some excesses, or zero where none is one.
@@ -267,7 +267,7 @@ def _judge_ranges(judged):
         # both ends of one range: one that is a whole turn too wide has another end
         near = np.array([fine.min(), fine.max()])
         reached = near + wrap_difference(there - near)
-        judged.add("ranges", np.abs(reached - [low.value, high.value]))
+        judged.add("ranges", abs(reached - [low.value, high.value]))
         judged.add_excess("ranges", near[1] - high.value, low.value - near[0])
     least = judged.facts.transmission
     answers = judged.ask(least.place), judged.fine
@@ -277,7 +277,7 @@ def _judge_ranges(judged):
         for of in answers
     ]
     square = sin(least.value) ** 2
-    judged.add("ranges", np.abs(squares[0] - square))
+    judged.add("ranges", abs(squares[0] - square))
     judged.add_excess("ranges", square - squares[1].min())
 
 
@@ -303,7 +303,7 @@ def _judge_drive(judged):
         judged.add_value("peaks", entry[f"peak_{kind}"], abs(facts.peak.value))
     judged.add("integrals", float(entry["closed"] != judged.closed))
     for name, fine in ("speed", fine_speed), ("power", fine_values * fine_speed):
-        most = np.abs(fine).max()
+        most = abs(fine).max()
         if name not in judged.growing and most != 0.0:
             beyond = entry[f"peak_{name}"] / most - 1.0
             judged.add_excess("peaks", -beyond, beyond - EXCESS_BETWEEN_POSITIONS)
@@ -328,7 +328,7 @@ class _Panels(NamedTuple):
         for width, values in zip(self.width, curve, strict=True):
             polynomial = Legendre.fit(_NODES, values, len(_NODES) - 1, [-1.0, 1.0])
             zeros = polynomial.roots()
-            zeros = np.sort(zeros[np.isreal(zeros) & (np.abs(zeros) < 1.0)].real)
+            zeros = np.sort(zeros[np.isreal(zeros) & (abs(zeros) < 1.0)].real)
             area = 0.5 * width * polynomial.integ(lbnd=-1.0)
             totals.append(totals[-1][-1] + area(np.append(zeros, 1.0)))
         return np.concatenate(totals)
@@ -403,7 +403,7 @@ def _judge_pins(judged):
         of_pin = judged.motor["pins"][pin]
         judged.add_value("pins", of_pin["peak"], peak.value)
         apart = there.quantities["theta_2"] - of_pin["theta_2"]
-        judged.add("pins", np.abs(wrap_difference(apart)))
+        judged.add("pins", abs(wrap_difference(apart)))
 
 
 def _judge_bending(judged):
@@ -430,9 +430,9 @@ def _judge_bending(judged):
                 (fine_motion, judged.fine, anywhere),
             )
         )
-        most = np.max([np.abs(piece.M).max() for piece in others])
+        most = np.max([abs(piece.M).max() for piece in others])
         size = abs(largest.peak.value)
-        moment = np.max([np.abs(piece.M[0]) for piece in at_peak])
+        moment = np.max([abs(piece.M[0]) for piece in at_peak])
         judged.add("bending", abs(moment - size) / size)
         judged.add_excess("bending", (most - size) / size)
 
@@ -449,5 +449,5 @@ def _judge_growth(judged):
     conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there
     # than it changes in a step
-    if conditions.min() - np.abs(np.diff(conditions)).max() > _LEAST_CONDITION:
+    if conditions.min() - abs(np.diff(conditions)).max() > _LEAST_CONDITION:
         judged.add("peaks", inf)

@@ -72,8 +72,7 @@ def take_few(question):
     for load in scene.loads:
         for corner in () if load.table is None else load.table.theta_2:
             fit &= (
-                np.abs(np.angle(np.exp(1j * (solution.theta_2 - corner))))
-                > _FROM_A_CORNER
+                abs(np.angle(np.exp(1j * (solution.theta_2 - corner)))) > _FROM_A_CORNER
             )
     indices = np.flatnonzero(fit)
     if not len(indices):

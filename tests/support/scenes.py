@@ -80,7 +80,7 @@ def meet_circles(near, far, r_near, r_far, side=1.0):
 
     `side`: -1 to the right.
     """
-    apart = np.abs(far - near)
+    apart = abs(far - near)
     along = (r_near**2 - r_far**2 + apart**2) / (2.0 * apart)
     across = side * np.sqrt(r_near**2 - along**2)
     return near + (far - near) / apart * (along + 1j * across)

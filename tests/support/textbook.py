@@ -109,7 +109,7 @@ class Bodies:
             before = self.z, self.theta
             self.z, self.theta = self.z + x + 1j * y, self.theta + turn
             last, gap = gap, self._gap()
-            if not np.abs(gap).max() < np.abs(last).max():
+            if not abs(gap).max() < abs(last).max():
                 self.z, self.theta = before
                 break
         return True

@@ -301,7 +301,7 @@ def test_a_designer_draws_a_cylinder_drive_and_analyze_gives_the_same(page, path
     solution = solve(scene)
     stroke = page.value("data.over.values[17]")
     assert force == approx(
-        solution.drive_force[np.abs(solution.stroke - stroke).argmin()],
+        solution.drive_force[abs(solution.stroke - stroke).argmin()],
         rel=PRINTED,
     )
     printed = show("analyze", path, "--pressure", "210 bar")

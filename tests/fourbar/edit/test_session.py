@@ -436,7 +436,7 @@ def test_another_command_goes_over_the_same_motion(tmp_path, command):
     for name in ("theta_2", "theta_3", "theta_4"):  # the same poses
         poses = np.unwrap(before[name])[order]
         apart = after[name] - np.interp(places, values[order], poses)
-        assert np.abs(np.sin(0.5 * apart)).max() < 1e-3
+        assert abs(np.sin(0.5 * apart)).max() < 1e-3
     assert ask(session, "undo")["text"] == BUCKET.read_text()
 
 
@@ -448,7 +448,7 @@ def test_another_command_goes_over_the_position_that_is_shown(session, shown):
     """
     ask(session, "command", command="theta_4", theta_2=shown)
     covered = solve(session.now.scene, "position").theta_2
-    assert np.abs(cis(covered) - cis(shown)).min() < 0.03
+    assert abs(cis(covered) - cis(shown)).min() < 0.03
 
 
 def test_what_does_not_move_cannot_be_commanded(session):

@@ -62,7 +62,7 @@ def test_beside_a_limit_of_the_input_its_digits_are_those_of_the_line(
     s = solve(scene, "error")
     assert s.status == ["ok"] and s.condition[0] < 1e-4
     exact = answer_in_balls(scene)
-    missed = np.abs(s.drive_force - exact["drive_force"])
+    missed = abs(s.drive_force - exact["drive_force"])
     assert missed <= BARS * s.drive_force_error
     for name in PIN_FORCES:
         missed = np.hypot(*(s[name] - exact[name]).T)
@@ -162,7 +162,7 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
     held = (*scene.effects, Friction.at(O2=0.05))
     rest = solve(replace(scene, effects=held, motion=motion.replace(speed=0.0)))
     width = rest.drive_force_high - rest.drive_force_low
-    assert_allclose(width, 0.1 / np.abs(speeds), rtol=1e-9)
+    assert_allclose(width, 0.1 / abs(speeds), rtol=1e-9)
 
 
 def test_a_study_and_a_file_carry_a_force_at_a_point():

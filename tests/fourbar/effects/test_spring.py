@@ -105,8 +105,8 @@ def test_turns_are_counted_whichever_bar_is_commanded(name, lengths, branch, bar
             spring = Torsion.at(**{pin: (2.0, rest, 0.1)})
             solution = solve(replace(shuffled, effects=(spring,)), "force")
             from_start = 2.0 * pi * round((between[0] - rest) / (2.0 * pi))
-            away = np.abs(between[some] - rest - from_start)
-            sure = np.abs(away - pi) > EDGE
+            away = abs(between[some] - rest - from_start)
+            sure = abs(away - pi) > EDGE
             sure &= solution.status_code != CHANGE_POINT
             wound = solution.status_code[sure] == WOUND
             assert np.array_equal(wound, away[sure] > pi), (pin, rest)

@@ -126,7 +126,7 @@ def compare_with_free_bodies(scene, s):
     # each position by the bar between whose others the sine is the larger
     sines = {2: np.sin(s.theta_4 - s.theta_3), 4: np.sin(s.theta_3 - s.theta_2)}
     for bar, other in ((2, 4), (4, 2)):
-        rows = np.abs(sines[bar]) >= np.fmax(np.abs(sines[other]), LEAST_SINE)
+        rows = abs(sines[bar]) >= np.fmax(abs(sines[other]), LEAST_SINE)
         if not rows.any():
             continue
         names = (f"{name}_{bar}" for name in ("theta", "omega", "alpha"))
@@ -135,12 +135,12 @@ def compare_with_free_bodies(scene, s):
         motion = Motion(**{f"theta_{bar}": 1.0, f"omega_{bar}": 1.0})
         told = replace(scene, motion=motion, drive_bar=bar)
         answer = FreeBody().answer(told, Command(angle, signs, *rates, bar=bar))
-        lost = BY_FREE_BODIES * size / np.abs(sines[bar][rows]) ** 3
+        lost = BY_FREE_BODIES * size / abs(sines[bar][rows]) ** 3
         for k, name in enumerate(PINS):
             apart = np.hypot(*(F[rows, k] - answer.quantities[name]).T)
             assert (apart <= lost).all(), name
         # nothing drives the bar that is told
-        assert (np.abs(answer.quantities["torque"]) <= lost).all()
+        assert (abs(answer.quantities["torque"]) <= lost).all()
 
 
 @mark.slow
@@ -162,7 +162,7 @@ def test_pin_forces_pass_a_limit_position_smoothly():
     times = np.unique(np.concatenate([np.linspace(0.0, 1.2, 121), dense]))
     s = solve(SWING, "force", at=coarse.command_at(times))
     assert set(s.status) == {"ok"}
-    assert set(s.branch) == {1, -1} and np.abs(s.sin_mu).min() < 1e-12
+    assert set(s.branch) == {1, -1} and abs(s.sin_mu).min() < 1e-12
     assert not np.any(s.torque)
     compare_with_free_bodies(SWING, s)
 
@@ -191,7 +191,7 @@ def test_a_spring_between_places_that_are_one_is_refused_where_it_is_released(pr
     alone = let_go(0.5, 0.0, 1.0, 50, DOWN)
     with_it = replace(alone, effects=(DOWN, Springs((proportional,))))
     one, other = (release(each).command.theta_2 for each in (with_it, alone))
-    assert np.abs(one - other).max() < 1e-9
+    assert abs(one - other).max() < 1e-9
 
 
 @mark.parametrize("sense", [1.0, -1.0])
@@ -200,7 +200,7 @@ def test_dry_friction_slows_a_flywheel_evenly_until_it_stands(sense):
     times = np.linspace(0.0, 1.0, 11)
     effects = [Flywheel(0.5), Friction.at(O2=0.4)]
     m = integrate(MASSLESS, effects, 0.3, 0.4 * sense, times)
-    assert np.abs(m.omega_2 - sense * np.maximum(0.4 - 0.8 * m.time, 0.0)).max() < 1e-9
+    assert abs(m.omega_2 - sense * np.maximum(0.4 - 0.8 * m.time, 0.0)).max() < 1e-9
 
 
 @mark.parametrize("speed", [20.0, -20.0])
@@ -211,7 +211,7 @@ def test_the_input_keeps_its_turns_while_the_output_is_read(speed):
     assert {*released.command.origin.bar} == {2, 4}
     turned = np.diff(released.theta_2)
     even = 0.5 * (released.omega_2[1:] + released.omega_2[:-1]) * np.diff(released.time)
-    assert np.abs(turned - even).max() < 0.02
+    assert abs(turned - even).max() < 0.02
     assert abs(released.theta_2[-1] - 1.0) > 1.5 * TURN
 
 
@@ -227,7 +227,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
         right = [(turned + k * pi) / 10.0 for k in range(5)]
         right = [t for t in right if t < 1.5]
         assert released.change_points == approx(right, abs=1e-9)
-        assert np.abs(released.command.omega_2 - speed).max() < 1e-9
+        assert abs(released.command.omega_2 - speed).max() < 1e-9
         assert set(released.command.branch) == {1}
 
 

@@ -41,7 +41,7 @@ ALIKE = [
     "function, reference",
     [
         *zip(ALIKE, ALIKE, strict=True),
-        (lambda x, y: np.sqrt(np.abs(x)), lambda x, y: mp.sqrt(abs(x))),
+        (lambda x, y: np.sqrt(abs(x)), lambda x, y: mp.sqrt(abs(x))),
         (
             lambda x, y: np.sin(x) + 1j * np.cos(y),
             lambda x, y: mp.sin(x) + 1j * mp.cos(y),

@@ -58,7 +58,7 @@ def nearly_special(seed, count):
 def closes(bars, theta_2):
     """Return how far circles of radii b, c about A, O4 are from missing, m."""
     d, a, b, c = bars.lengths
-    distance = np.abs(a * cis(theta_2) - d * cis(bars.ground_angle))
+    distance = abs(a * cis(theta_2) - d * cis(bars.ground_angle))
     return np.minimum(b + c - distance, distance - abs(b - c))
 
 
@@ -121,7 +121,7 @@ def test_circuits_agree_with_a_scan(bars):
     """
     theta_2 = bars.ground_angle + (np.arange(GRID) + 0.5) * (tau / GRID)
     margin = closes(bars, theta_2)
-    sure = np.abs(margin) > 16.0 * EPS * sum(bars.lengths)
+    sure = abs(margin) > 16.0 * EPS * sum(bars.lengths)
     ranges = [(theta_2 - a) % tau <= b - a for a, b in find_intervals(bars)]
     assert (np.any(ranges, axis=0)[sure] == (margin >= 0.0)[sure]).all()
     assert turns_fully(bars) == bool((margin[sure] >= 0.0).all())
@@ -131,7 +131,7 @@ def test_circuits_agree_with_a_scan(bars):
     joined = closed & closed[ahead]
     meets = closed & ~(joined & np.roll(closed, 1))
     if change_points(bars):
-        touches = np.abs(closes(bars, theta_2 - pi / GRID)) < 1e-12
+        touches = abs(closes(bars, theta_2 - pi / GRID)) < 1e-12
         meets |= closed & touches & np.isin(place, (0, GRID // 2))
     starts = np.concatenate([place[joined], GRID + place[joined], place[meets]])
     ends = np.concatenate([ahead[joined], GRID + ahead[joined], GRID + place[meets]])

@@ -16,7 +16,7 @@ from tests.support.scenes import EPS, PARALLELOGRAM, bare, cis
 
 def find_singular(position):
     """Mark positions whose bars 3 and 4 lie in one line."""
-    return np.abs(position.sin_mu) <= NO_DIGIT_LEFT
+    return abs(position.sin_mu) <= NO_DIGIT_LEFT
 
 
 def assembled(state):
@@ -88,7 +88,7 @@ def test_short_ground_and_input_leave_no_digit_of_mu():
         link = bare(d, a, b, b)
         moving = compute_state(link, psi, 1, 2.0)
         singular = find_singular(moving.position)
-        e = np.abs(d - a * cis(psi))
+        e = abs(d - a * cis(psi))
         assert assembled(moving).all()
         assert np.array_equal(singular, e / b <= 8.0 * EPS)
         assert np.array_equal(np.isnan(moving.omega(3)), singular)

@@ -113,18 +113,18 @@ def test_coupler_curves_are_closed_and_lie_on_the_sextic(name, lengths):
         point = curve.x + 1j * curve.y
         assert np.isfinite(point).all()
         assert point[0] == point[-1] and curve.branch[0] == curve.branch[-1]
-        steps = np.abs(np.diff(point))
+        steps = abs(np.diff(point))
         # a jump to another branch or circuit is as long as a bar; a step of the curve
         # is not
         assert steps.max() < 0.1 * min(lengths)
         assert (curve.branch == 1).any() == (1 in circuits(bars)[circuit].branches)
-        feet = (np.abs(point) ** 2 + a * a - abs(arm) ** 2) / (2 * np.abs(point))
+        feet = (abs(point) ** 2 + a * a - abs(arm) ** 2) / (2 * abs(point))
         height = np.sqrt(np.maximum(a * a - feet**2, 0.0))
         off = []
         for side in (1, -1):
-            pin_a = point / np.abs(point) * (feet + 1j * side * height)
+            pin_a = point / abs(point) * (feet + 1j * side * height)
             pin_b = pin_a + (point - pin_a) / arm * b
-            off.append(np.abs(np.abs(pin_b - d * np.exp(0.3j)) - c))
+            off.append(abs(abs(pin_b - d * np.exp(0.3j)) - c))
         assert np.minimum(*off)[height > 1e-3 * a].max() < 1e-9
 
 

@@ -133,7 +133,7 @@ class Opened:
         round_ = replace(scene, drive=None, drive_bar=2, motion=motion)
         expected, turn = self.solve_here(scene), solve(round_, "force")
         return {
-            name: np.abs(answer - expected[name][0]).max() / np.abs(turn[name]).max()
+            name: abs(answer - expected[name][0]).max() / abs(turn[name]).max()
             for name, answer in answers.items()
         }
 
@@ -283,7 +283,7 @@ def is_of_the_instant_after_forward(file):
     file.step()
     before = read()
     file.forward()
-    assert np.abs(read() - before)[[0, 1, 2, -2, -1]].min() > 0.0
+    assert abs(read() - before)[[0, 1, 2, -2, -1]].min() > 0.0
     assert file.error("F43", file.at_B) < file.exact
     if file.drive == "flywheel" and file.scene.motion.free is None:
         assert file.error("F43", before[-2:]) > 10.0 * file.exact
@@ -319,7 +319,7 @@ def yields_more(file):
     Change points and static loads are measured with the check of files.
     """
     file.move_on()
-    sine = np.abs(solve(file.scene, "position").sin_mu).min()
+    sine = abs(solve(file.scene, "position").sin_mu).min()
     assert file.error("F43", file.at_B) < 1e-4 / sine**2
 
 
@@ -335,7 +335,7 @@ def has_one_control_with_a_range(file):
     assert m.nu == 1 and m.actuator_ctrlrange.shape == (1, 2)
     turn = solve(scene, "force")
     driving = turn.torque if scene.drive is None else turn.drive_force
-    most = 2.0 * np.nanmax(np.abs(driving))
+    most = 2.0 * np.nanmax(abs(driving))
     assert m.actuator_ctrlrange[0] == approx([-most, most], rel=5e-3)
     d.ctrl[0] = 10.0 * most
     file.forward()

@@ -493,7 +493,7 @@ def test_the_rates_are_the_largest_of_the_bars_that_follow():
     dense = solve(Scene(MASSLESS, turn(20_000)))
     for name, factor, unit in (("omega", 30.0 / pi, "rpm"), ("alpha", 1.0, "rad/s²")):
         rates = factor * np.array([dense[f"{name}_3"], dense[f"{name}_4"]])
-        first, second = (rate[np.abs(rate).argmax()] for rate in rates)
+        first, second = (rate[abs(rate).argmax()] for rate in rates)
         assert f"{name} {first:.4g} {unit} {second:.4g} {unit} at" in text
 
 
@@ -522,7 +522,7 @@ def test_a_start_from_rest_works_against_the_whole_of_dry_friction(alpha, angle)
     still = Motion(angle, 0.0 * np.array(angle), np.full_like(angle, alpha))
     starts = solve(crank_rocker(still, effects=WEIGHT)).torque
     starts = starts + np.copysign(0.2, alpha)
-    largest = starts[np.abs(starts).argmax()]
+    largest = starts[abs(starts).argmax()]
     scene = crank_rocker(still, effects=(*WEIGHT, Friction.at(O2=0.2)))
     facts = Facts(solve(scene))
     start = facts.motion.start.value
@@ -635,7 +635,7 @@ def test_a_bore_at_rest_moves_the_linkage_against_its_friction(senses, alpha):
     speed = 1e-9 * np.array(senses)
     creeping = crank_rocker(Motion(0.0 * speed + CORNERS[2], speed, alpha), **rubbing)
     creeps = solve(creeping)
-    force = np.abs(creeps.drive_force).max()
+    force = abs(creeps.drive_force).max()
     pin = np.hypot(*creeps.F12.T).max()
     bore = 1e3 * sqrt(4.0 * force / (pi * 210e5))
     text = block(crank_rocker(motion, **rubbing), pressure=210e5)

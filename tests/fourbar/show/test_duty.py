@@ -55,8 +55,8 @@ def test_shaking_is_the_momentum_that_the_bars_lose(drive):
         force -= bar.mass * a
         moment -= bar.mass * (G[:, 0] * a[:, 1] - G[:, 1] * a[:, 0])
         moment -= bar.moment_of_inertia * s[f"alpha_{number}"]
-    assert np.abs(shaking_force(s) - force).max() < ROUND_OFF * np.abs(force).max()
-    assert np.abs(shaking_moment(s) - moment).max() < ROUND_OFF * np.abs(moment).max()
+    assert abs(shaking_force(s) - force).max() < ROUND_OFF * abs(force).max()
+    assert abs(shaking_moment(s) - moment).max() < ROUND_OFF * abs(moment).max()
 
 
 SPRING = Spring(Place(1, (0.05, 0.4)), Place(3, (0.1, 0.2)), 300.0, 0.05)
@@ -147,7 +147,7 @@ def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
     s = solve(crank_rocker(Motion(np.linspace(0.1, stop, 61), 10.0)))
     assert describe_motion(s).solve_with_peaks() is s
     duty = motor_duty(s)
-    assert duty.peak_power == np.abs(s.power).max()
+    assert duty.peak_power == abs(s.power).max()
     counted = s.power[: 61 - (stop > tau)]
     assert duty.rms_power == approx(np.sqrt(np.mean(counted**2)), rel=ROUND_OFF)
     assert (duty.energy_in, duty.energy_swing, duty.mean_torque) == (None, None, None)

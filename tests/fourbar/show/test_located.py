@@ -359,7 +359,7 @@ def test_a_force_grows_without_bound_beside_a_change_point():
         UNIFORM_PARALLELOGRAM, Motion(Sweep(0.0, tau, 12), 1.0), effects=WEIGHT
     )
     found = locate(scene, "F14", "5 kN").places
-    assert len(found) == 4 and np.abs(np.sin(found)).max() < 0.01
+    assert len(found) == 4 and abs(np.sin(found)).max() < 0.01
     forces = solve(replace(scene, motion=Motion(found, 1.0))).F14
     assert np.hypot(*forces.T) == approx(5e3, rel=1e-9)
     with raises(NotAssembledError, match="it has none, and grows without bound"):

@@ -101,8 +101,7 @@ def test_slopes_name_the_length_that_changes_most_and_spreads_their_deviation():
     }
     steps["lengths.ground_angle"] = math.radians(1.0)
     change, most = max(
-        (np.abs(slopes.of("torque", key)).max() * step, key)
-        for key, step in steps.items()
+        (abs(slopes.of("torque", key)).max() * step, key) for key, step in steps.items()
     )
     line = re.search("<td>torque</td>.*?</tr>", slopes._repr_html_())
     assert f"{most} {change:.3g}" in line[0]
@@ -133,7 +132,7 @@ def test_the_slope_of_a_size_is_its_difference():
     ahead, back = np.hypot(*np.moveaxis(solve(around).F12, -1, 0))
     slope = (ahead - back) / (2.0 * step)
     slopes = sensitivity(LOOSE)
-    close = 1e-6 * np.abs(slope).max()
+    close = 1e-6 * abs(slope).max()
     assert slopes.of("|F12|", "lengths.input") == approx(slope, abs=close)
     for wrong in ("|A|", "F12_z", "|torque|", "torque_x", 3):
         with raises(InputError, match=r"is not known here; known: .*F12"):

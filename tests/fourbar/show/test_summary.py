@@ -120,7 +120,7 @@ def list_sizes(scene, s):
         curves[f"bending_{bar}"] = largest_bending(scene, s, bar).moment
         if not acts(scene):
             curves |= {n: s[n] for n in (f"omega_{bar}", f"alpha_{bar}")}
-    return {name: np.abs(values) for name, values in curves.items()}
+    return {name: abs(values) for name, values in curves.items()}
 
 
 def find_slip(s, pin):
@@ -161,7 +161,7 @@ def test_facts_are_those_of_a_dense_scan(name):
         slips = find_slip(solve(scene, at=command_at(scene, scan(scene, ends)[0])), pin)
         left = find_slip(motion.solve_at(reversals), pin)
         assert len(left) == np.count_nonzero(slips[1:] * slips[:-1] < 0.0) > 0
-        assert np.abs(left).max() < 1e-7 * np.abs(slips).max()
+        assert abs(left).max() < 1e-7 * abs(slips).max()
         corners += reversals.tolist()
     places, weights = scan(scene, ends, *corners)
     dense = solve(scene, at=command_at(scene, places))
@@ -187,10 +187,10 @@ def test_facts_are_those_of_a_dense_scan(name):
         assert low.value - EXACT <= angles.min() <= angles.max() <= high.value + EXACT
         reached = motion.solve_at(np.array([low.place, high.place]))
         away = reached[f"theta_{bar}"] - [low.value, high.value]
-        assert np.abs(np.sin(0.5 * away)).max() < EXACT
+        assert abs(np.sin(0.5 * away)).max() < EXACT
         assert facts.bending[bar].peak == panels.find_peak(f"bending_{bar}")
     least = facts.transmission
-    assert sin(least.value) <= np.abs(dense.sin_mu).min() * (1.0 + EXACT)
+    assert sin(least.value) <= abs(dense.sin_mu).min() * (1.0 + EXACT)
     (sine,) = motion.solve_at(np.array([least.place])).sin_mu
     assert abs(sine) == approx(sin(least.value), rel=EXACT)
     check_loads(facts, sizes, weights / weights.sum())
@@ -371,7 +371,7 @@ def test_transmission_angle_is_the_least_of_all_stretches():
     assert np.nanmin(sines) < 0.0 < np.nanmax(sines)
     least = Facts(solve(scene)).transmission
     # 20 000 steps of a turn miss an angle that grows as the root at a limit
-    assert least.value == approx(asin(np.nanmin(np.abs(sines))), abs=1e-3)
+    assert least.value == approx(asin(np.nanmin(abs(sines))), abs=1e-3)
 
 
 def test_transmission_angle_of_a_release_is_zero_on_its_change_points():

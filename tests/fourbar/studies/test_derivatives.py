@@ -49,7 +49,7 @@ def test_a_drawn_coordinate_counts_by_a_hundredth_of_the_longest_bar():
         "motion.omega_2": 0.01 * numbers["motion.omega_2"],
     }.items():
         (change,) = (row.change for row in slopes.influences("|F12|") if row.key == key)
-        most = np.nanmax(np.abs(slopes.of("|F12|", key)))
+        most = np.nanmax(abs(slopes.of("|F12|", key)))
         assert abs(change) == approx(step * most, rel=EXACT)
 
 
@@ -90,7 +90,7 @@ def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
     for name in ("torque_low", "torque_high"):
         for key in (key for key in rest.keys if "friction" in key):
             differences = differ_by_a_study(nominal, key, name)
-            assert np.abs(differences).max() > 0.0
+            assert abs(differences).max() > 0.0
             assert_allclose(rest.of(name, key), differences, rtol=1e-6, atol=1e-9)
     text = write_sensitivity(rest, None)
     assert max(map(len, text.split("\n"))) <= BLOCK_WIDTH and "torque_low" in text
@@ -106,7 +106,7 @@ def test_the_largest_share_comes_first_and_rounding_is_no_influence():
     text = write_sensitivity(slopes, None)
     rows = text[text.index("largest value") :].splitlines()
     cells = np.array([row.split()[-5:] for row in rows if row]).astype(float)
-    assert (np.diff(np.max(np.abs(cells[1:]) / cells[0], axis=1)) < 1e-3).all()
+    assert (np.diff(np.max(abs(cells[1:]) / cells[0], axis=1)) < 1e-3).all()
 
 
 def differ_by_a_study(nominal, key, name="theta_3"):

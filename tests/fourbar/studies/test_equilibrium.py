@@ -208,7 +208,7 @@ def test_friction_holds_a_pendulum_within_the_angle_that_it_can():
     assert len(equilibria.held) == 2
     assert all(lower.theta_2 < upper.theta_2 for lower, upper in equilibria.held)
     Q = -FALLS * np.sin(equilibria.positions.theta_2)
-    assert np.array_equal(equilibria.moves, np.where(np.abs(Q) <= f, 0.0, np.sign(Q)))
+    assert np.array_equal(equilibria.moves, np.where(abs(Q) <= f, 0.0, np.sign(Q)))
     stuck = equilibrium(crank_as_pendulum(DOWN, Friction.at(O2=10.0)))
     assert not stuck.moves.any() and len(stuck.held) == 1
     assert all(rest.held for rest in stuck.found)
@@ -263,9 +263,9 @@ def test_past_one_change_point_the_angle_is_that_of_the_scenes_assembly(
     assert (np.diff(angles) > 0.0).all()
     ends = (swept or FULL).start, (swept or FULL).stop
     torques = solve(moving(np.linspace(*ends, 3000))).torque
-    nothing = 1e-9 * np.nanmax(np.abs(torques))
-    assert np.abs(solve(moving(angles)).torque).max() < nothing
-    signs = np.sign(torques[np.abs(torques) > nothing])
+    nothing = 1e-9 * np.nanmax(abs(torques))
+    assert abs(solve(moving(angles)).torque).max() < nothing
+    signs = np.sign(torques[abs(torques) > nothing])
     assert len(angles) == np.sum(signs[1:] != signs[:-1]) > 0
 
 
@@ -457,8 +457,8 @@ def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     scene = Scene(FourBar(0.6, arm, Bar(0.6, 25.0), arm), Motion(0.0), effects=(DOWN,))
     equilibria = equilibrium(scene)
     slope = np.cos(equilibria.positions.theta_2)
-    falls = np.where(np.abs(slope) > CLOSE, -np.sign(slope), 0.0)
-    falls[np.abs(np.sin(equilibria.positions.theta_2)) < CLOSE] = 0.0
+    falls = np.where(abs(slope) > CLOSE, -np.sign(slope), 0.0)
+    falls[abs(np.sin(equilibria.positions.theta_2)) < CLOSE] = 0.0
     assert_array_equal(equilibria.moves, falls)
     rows = [row.split() for row in write_equilibria("", equilibria).splitlines()]
     words = {row[0]: row[-1] for row in rows if row}

@@ -58,8 +58,8 @@ def test_a_number_that_the_torque_is_proportional_to():
     # the torque of inertia alone is proportional to its square
     study = spread(Tolerance("motion.omega_2", 0.3))
     torque = study.spreads["torque"]
-    size = np.abs(torque.nominal)
-    most = np.fmax(np.abs(torque.least), np.abs(torque.greatest))
+    size = abs(torque.nominal)
+    most = np.fmax(abs(torque.least), abs(torque.greatest))
     assert_allclose(most, 1.0609 * size, rtol=1e-4)
     assert_allclose(torque.worst, 2 * 0.03 * size, rtol=1e-12)
     assert_allclose(torque.first_order, 2 * 0.03 / sqrt(3) * size, rtol=1e-12)
@@ -89,7 +89,7 @@ def test_a_normal_tolerance_is_drawn_as_far_out_as_the_samples_go():
     """Of n numbers the k-th is the quantile (k + 1/2)/n, within one of n."""
     theta = spread(Tolerance("lengths.output", 2e-5, True)).spreads["theta_4"]
     for end in (theta.least, theta.greatest):
-        sigmas = np.abs(end - theta.nominal) / theta.first_order
+        sigmas = abs(end - theta.nominal) / theta.first_order
         assert (sigmas > norm.isf(1.0 / 2048)).all()
 
 

@@ -71,7 +71,7 @@ def assert_agreement(name, answers, share=0.0):
         apart = find_distance(values, answers[quantity])
         size = find_distance(values, 0.0).max()
         if quantity.startswith("theta"):
-            apart = np.minimum(apart, np.abs(apart - 2.0 * np.pi))
+            apart = np.minimum(apart, abs(apart - 2.0 * np.pi))
             size = 1.0
         allowed = np.asarray(problem["errors"][quantity]) + share * size
         assert (apart <= allowed).all(), quantity
@@ -117,7 +117,7 @@ def test_ninety_digits_or_free_bodies_answer_the_same(name):
     by_bodies = name in ("cylinder", "pin_friction")
     engine = FreeBody if by_bodies else BallArithmetic
     answers = engine().answer(*ask_position(name)).quantities
-    least = np.abs(answers["sin_mu"]).min()
+    least = abs(answers["sin_mu"]).min()
     assert_agreement(name, answers, by_bodies * K * EPS / least**2)
 
 
@@ -255,9 +255,9 @@ def solve_pin_forces(problem, theta, omega):
     released = replace(scene, motion=fourbar.Motion(0.0, 0.0))
     answers = BallArithmetic().answer(released, motion).quantities
     forces = {name: answers[name] for name in PIN_FORCES}
-    largest = max(np.abs(force).max() for force in forces.values())
+    largest = max(abs(force).max() for force in forces.values())
     length = problem["scene"]["lengths"]["input"]
-    assert np.abs(answers["torque"]).max() < K * EPS * largest * length
+    assert abs(answers["torque"]).max() < K * EPS * largest * length
     return forces
 
 
@@ -351,7 +351,7 @@ def test_a_level_is_that_of_the_worst_position(torque, level):
 def test_error_bars_are_allowed_where_they_are_larger():
     problem = read_stored("near_limit")
     torque, bars = (np.array(problem[key]["torque"]) for key in ("answers", "errors"))
-    assert (bars > LEVELS["A"] * np.abs(torque).max()).any()
+    assert (bars > LEVELS["A"] * abs(torque).max()).any()
     beside = (torque + 0.9 * bars).tolist()
     assert levels_of("near_limit", torque=beside)["torque"] == "A"
 

@@ -37,7 +37,7 @@ def test_newton_s_free_bodies_find_our_answers():
     assert len(solved) == 37
     for name, theirs in zip(("torque", "F14"), zip(*solved, strict=True), strict=True):
         ours = np.array(problem["answers"][name])
-        assert np.abs(np.array(theirs) - ours).max() <= DIGITS * np.abs(ours).max()
+        assert abs(np.array(theirs) - ours).max() <= DIGITS * abs(ours).max()
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.parent.name)
@@ -53,11 +53,11 @@ def test_a_file_for_another_project_states_our_answers(path):
         problem = read_problem(PROBLEMS / f"{name}.json")
         angles = np.rad2deg(problem["command"]["theta_2"])
         for degrees, row in table.items():
-            index = int(np.argmin(np.abs(angles - degrees)))
+            index = int(np.argmin(abs(angles - degrees)))
             assert abs(angles[index] - degrees) < 1e-9
             for column, value in zip(stated["COLUMNS"], row, strict=True):
                 ours = np.asarray(problem["answers"][column])
-                apart = np.abs(ours[index] - value).max()
-                assert apart <= DIGITS * np.abs(ours).max(), (name, degrees, column)
+                apart = abs(ours[index] - value).max()
+                assert apart <= DIGITS * abs(ours).max(), (name, degrees, column)
                 compared += 1
     assert compared >= 16

@@ -31,7 +31,7 @@ def answer(**off):
     quantities = {name: np.array(getattr(solution, name)) for name in ERROR_NAMES}
     for name, part in off.items():
         values = quantities[name]
-        size = np.abs(values) if values.ndim == 1 else np.hypot(*values.T)
+        size = abs(values) if values.ndim == 1 else np.hypot(*values.T)
         values[(-1, 0) if values.ndim == 2 else -1] += part * size.max()
     return quantities
 

@@ -391,7 +391,7 @@ IN_CRANK_ROCKER = {
     ),
     "the power is given": changed(lambda right: {"torque": 10.0 * right["torque"]}),
     "the sign is lost: sizes alone": changed(
-        lambda right: {"torque": np.abs(right["torque"])}
+        lambda right: {"torque": abs(right["torque"])}
     ),
     "y reversed": units(*PIN_FORCES, factor=(1.0, -1.0)),
     "x reversed": units("F12", "F32", factor=(-1.0, 1.0)),
@@ -825,7 +825,7 @@ def test_every_column_of_the_file_of_analyze_is_known(name, tmp_path):
     assert len(made) > len(MADE_OF)
     for key in table.columns.keys() - {*NOT_JUDGED, table.found_by}:
         column = table.columns[key]
-        far = 1e-6 * np.nanmax(np.abs(column.values))
+        far = 1e-6 * np.nanmax(abs(column.values))
         exact = np.zeros(len(column.values))
         off = column._replace(values=column.values + far, rounding=exact)
         theirs = replace(table, columns={**table.columns, key: off})

@@ -70,7 +70,7 @@ def moved(name, place, by):
     value.
     """
     values = np.array(FORMULAS[name])
-    values[place] += by * (1.0 if name[:5] == "theta" else np.abs(values).max())
+    values[place] += by * (1.0 if name[:5] == "theta" else abs(values).max())
     return values
 
 

@@ -359,7 +359,7 @@ def miss_between(scene, count, degree):
     """Return the worst error between samples where the driven bar is far from rest."""
     fine = np.linspace(0.0, 2.0 * pi, 4 * count + 1)
     exact = solve(scene, at=command_at(scene, fine))
-    speed = np.abs(exact[f"omega_{scene.drive_bar}"])
+    speed = abs(exact[f"omega_{scene.drive_bar}"])
     far = speed > 0.1 * speed.max()
     sampled = np.flatnonzero(far[::4])
     worst = 0.0
@@ -368,5 +368,5 @@ def miss_between(scene, count, degree):
         curve = make_interp_spline(
             fine[::4][stretch], exact.torque[::4][stretch], degree
         )
-        worst = max(worst, float(np.abs(curve(fine[rows]) - exact.torque[rows]).max()))
-    return worst / float(np.abs(exact.torque[far]).max())
+        worst = max(worst, float(abs(curve(fine[rows]) - exact.torque[rows]).max()))
+    return worst / float(abs(exact.torque[far]).max())

@@ -33,10 +33,10 @@ def test_decimals_whose_sums_are_equal_meet_in_one_line(unit, stated):
     exact = [Fraction(text) * scale for text in stated]
     assert find_stated_lengths(linkage.lengths) == exact
     command = fourbar.command(Scene(linkage, Motion([0.0, math.pi], 1.0)))
-    assert np.nanmin(np.abs(compute_exact_sines(linkage, command))) < 1e-15
+    assert np.nanmin(abs(compute_exact_sines(linkage, command))) < 1e-15
     d, *others = linkage.lengths
     longer = uniform(d, *(x * (1 + 1e-9) for x in others))
-    assert np.all(~(np.abs(compute_exact_sines(longer, command)) < 1e-6))
+    assert np.all(~(abs(compute_exact_sines(longer, command)) < 1e-6))
 
 
 def test_the_status_on_a_change_point_in_decimals_is_right():

@@ -135,9 +135,9 @@ def test_over_a_turn_what_stores_energy_gives_it_back():
         return got["torque"] * (10.0 if bar == 2 else got["omega_4"])
 
     of_2, of_4 = power(2), power(4)
-    most = np.abs(of_2).max()
+    most = abs(of_2).max()
     assert abs(of_2.sum()) < 512 * 1e-14 * most
-    assert of_4 == approx(of_2, abs=1e-10 * np.abs(of_4).max(), rel=0)
+    assert of_4 == approx(of_2, abs=1e-10 * abs(of_4).max(), rel=0)
     assert most > 1.0
 
 
@@ -153,13 +153,13 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
     loss = 0.0
     for pin, *numbers in effect.rows:
         i, j = PINS[pin]
-        slip = np.abs(omega[j - 1] - omega[i - 1])
+        slip = abs(omega[j - 1] - omega[i - 1])
         load = np.hypot(*braked[PIN_FORCE[pin]].T)
         size = {"viscous": slip, "friction": 1.0, "pin_friction": load}[key]
         loss = loss + prod(numbers) * slip * size
     more = 10.0 * (braked["torque"] - answered(crank_rocker(effects=()))["torque"])
     assert (loss > 0.0).all()
-    allowed = 1e-12 * 10.0 * np.abs(braked["torque"]).max()
+    allowed = 1e-12 * 10.0 * abs(braked["torque"]).max()
     assert more == approx(loss, abs=allowed, rel=0)
 
 
@@ -192,9 +192,9 @@ def test_friction_of_several_pins_fulfils_its_equations():
     )
     k = np.array([0.05, 0.1, 0.02])
     x, _ = continue_couples(F, C, k)
-    load = np.abs(F + (C * x[:, None, :]).sum(axis=-1))
+    load = abs(F + (C * x[:, None, :]).sum(axis=-1))
     assert (x > 0.0).all()
-    assert np.abs(x - k * load).max() <= DIGITS * np.abs(x).max()
+    assert abs(x - k * load).max() <= DIGITS * abs(x).max()
 
 
 def test_a_singular_position_costs_no_other():

@@ -180,12 +180,12 @@ def test_a_step_of_refinement_leaves_the_residual_of_a_rounding():
     jacobian = np.array([[0.3, 1.0, -1.0], [0.2, 0.7, -0.7 + 1e-9]])
     turn = np.array([0.0, 1.0, 0.5])
     rates = solve_closed(jacobian, 2.0, turn, (0.3, -0.4))
-    terms = np.abs(jacobian) @ np.abs(rates)
-    assert np.all(np.abs(jacobian @ rates + [0.3, -0.4]) <= 4.0 * EPS * terms)
+    terms = abs(jacobian) @ abs(rates)
+    assert np.all(abs(jacobian @ rates + [0.3, -0.4]) <= 4.0 * EPS * terms)
     multipliers = np.array(solve_multipliers(jacobian, turn, [0.3, -0.4, 0.7]))
     columns = np.vstack([jacobian, turn]).T
     rest = columns @ multipliers - [0.3, -0.4, 0.7]
-    assert np.all(np.abs(rest) <= 4.0 * EPS * (np.abs(columns) @ np.abs(multipliers)))
+    assert np.all(abs(rest) <= 4.0 * EPS * (abs(columns) @ abs(multipliers)))
 
 
 def test_a_drive_that_exerts_a_force_is_predicted_and_moves_no_bar():

@@ -226,7 +226,7 @@ def test_open_loops_that_the_errata_state():
 
     def gaps(third, fourth):
         crank = d * cis(THETA_1) + a * unit[0]
-        return np.abs(crank + b * unit[third] + c * unit[fourth])
+        return abs(crank + b * unit[third] + c * unit[fourth])
 
     first, second = gaps(1, 4), gaps(2, 3)
     assert f"{first.max():.3f} cm" in ERRATA["6"]["derivation"]

@@ -365,7 +365,7 @@ def draw_answer(*rows, **numbers):
 def test_a_red_figure_draws_the_error_and_the_limit_of_the_guest():
     """A reversed force lies on the curve of its size."""
     row = mine("F43", error=2.0, allowed=1e-6, verdict=FAILS)
-    largest = int(np.argmax(np.max(np.abs(SOLUTION.F43), axis=0)))
+    largest = int(np.argmax(np.max(abs(SOLUTION.F43), axis=0)))
     drawn = draw_answer(row, torque=SOLUTION.torque, F43=-SOLUTION.F43)
     assert f"F43 {'xy'[largest]} (N)" in drawn and "allowed to mine" in drawn
     held = replace(row, verdict=AGREES, allowed=1e-14)

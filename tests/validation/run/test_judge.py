@@ -146,7 +146,7 @@ AT_REST = 1
 def miss_the_reversal(answer):
     """Be off by a thousandth at AT_REST, and nowhere else."""
     for values in answer.quantities.values():
-        values[AT_REST] += 1e-3 + 1e-3 * np.abs(values[AT_REST])
+        values[AT_REST] += 1e-3 + 1e-3 * abs(values[AT_REST])
 
 
 def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():

@@ -54,7 +54,7 @@ def find_spread_by_energy(scene, solution, instant, engine):
     start, _ = free.FORWARD[engine]
     times = np.linspace(0.0, 1.0, len(solution))
     energy = start(free.LONGEST_TIMESTEP).release(scene, times).energy
-    lost = float(np.abs(energy - energy[0]).max())
+    lost = float(abs(energy - energy[0]).max())
     kinetic = 0.0
     for number in (2, 3, 4):
         bar = scene.linkage.bar(number)
@@ -69,7 +69,7 @@ def find_spread_by_energy(scene, solution, instant, engine):
         speed = solution.omega_2[instant] * np.sqrt(1.0 + change / kinetic)
         motion = Motion(float(solution.theta_2[instant]), float(speed), free=rest)
         other = solve(replace(scene, motion=motion))
-        apart = np.abs(other.theta_2 - solution.theta_2[instant:])
+        apart = abs(other.theta_2 - solution.theta_2[instant:])
         spread = max(spread, float(apart.max()))
     return spread
 

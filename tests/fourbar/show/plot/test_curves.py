@@ -56,7 +56,7 @@ def test_curves_are_columns_in_the_unit_of_their_axis(figure, name, column):
     shown = np.interp(DEGREES, *list_lines(figure, units="mN")[name].T)
     (expected,) = choose_columns(solve(SCENE), column)
     values = expected.shown(fourbar.units("mN"))
-    assert shown == approx(values, rel=1e-9, abs=1e-9 * np.abs(values).max())
+    assert shown == approx(values, rel=1e-9, abs=1e-9 * abs(values).max())
 
 
 @mark.slow
@@ -96,8 +96,8 @@ def measure_chords(path):
     """
     steps = np.diff(path)
     extent = float(max(np.ptp(path.real), np.ptp(path.imag)))
-    turns = np.abs(np.angle(steps[1:] / steps[:-1]))
-    return float(np.abs(steps).max()) / extent, float(np.degrees(turns.max()))
+    turns = abs(np.angle(steps[1:] / steps[:-1]))
+    return float(abs(steps).max()) / extent, float(np.degrees(turns.max()))
 
 
 @mark.slow
@@ -109,14 +109,14 @@ def test_the_whole_circuit_is_traced_without_a_corner_and_drawn():
     assert path[0] == approx(path[-1])
     longest, sharpest = measure_chords(path)
     assert longest < LONGEST and sharpest < 30.0
-    away = np.abs(path - join(view.here.points["E"][0]))
+    away = abs(path - join(view.here.points["E"][0]))
     assert away.min() < 0.5 * LONGEST * np.ptp(path.real)
     # the curve of the formulas, by many more positions
     curve = fourbar.coupler_curve(view.scene, "E", steps=200_000)
     dense = curve.x + 1j * curve.y
-    apart = np.abs(np.diff(dense)).max()
+    apart = abs(np.diff(dense)).max()
     for point in path[:: len(path) // 40]:
-        assert np.abs(dense - point).min() < apart
+        assert abs(dense - point).min() < apart
     drawn = join(list_lines("coupler", view.scene)["E"])
     assert drawn == approx(path + complex(*view.scene.origin))
 
@@ -149,7 +149,7 @@ def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
     places = join(derive(make_view(scene).sweep, "I24"))
     drawn = join(list_lines("centres", scene)["$I_{24}$"])
     (first, *_) = drawn[np.isfinite(drawn)]
-    assert np.nanmin(np.abs(places - first)) < 1e-9
+    assert np.nanmin(abs(places - first)) < 1e-9
 
 
 def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():

@@ -317,7 +317,7 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     (first,) = np.flatnonzero(x == places[0])
     assert np.isnan(x[first + 1]) and np.isnan(y[first + 1])
     assert x[first + 2] == places[1]
-    assert panel.get_ylim()[1] < np.nanmax(np.abs(sweep.torque))
+    assert panel.get_ylim()[1] < np.nanmax(abs(sweep.torque))
     assert "Torque of the drive on bar 4 clipped at" in words_of(figure)
 
 
@@ -350,7 +350,7 @@ def test_free_bodies_balance(drive):
     for bar in (2, 3, 4):
         freed = freebody.FreedBar(shown, bar)
         forces = np.array([arrow.force for arrow in freed.arrows])
-        assert np.abs(forces.sum()) <= BALANCE * np.abs(forces).max()
+        assert abs(forces.sum()) <= BALANCE * abs(forces).max()
         moments = [(arrow.at.conjugate() * arrow.force).imag for arrow in freed.arrows]
         moments += [couple.moment for couple in freed.turns]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
@@ -452,7 +452,7 @@ def test_the_peak_of_the_torque_is_marked_with_its_value(turned):
     if turned:  # speed changes sign, and so does the angle at which friction acts
         scene = recommand(scene, speed=-10.0)
     torque = 1e3 * solved(scene).torque
-    peak = torque[np.abs(torque).argmax()]
+    peak = torque[abs(torque).argmax()]
     figure = composed(scene, "torque")
     panel = figure.axes[0]
     assert panel.get_ylabel() == "$T_2$ (mN m)"
