@@ -5,7 +5,7 @@ Thirteen equations and a loop closed by a quadratic share nothing with the formu
 
 from dataclasses import replace
 from itertools import combinations, cycle, product
-from math import tau
+from math import pi, tau
 
 import numpy as np
 import pytest
@@ -207,7 +207,7 @@ def test_every_quantity_is_that_of_balls(name):
     for quantity in compared:
         apart = s[quantity] - exact[quantity]
         if quantity.startswith("theta"):  # balls have no whole turns
-            apart = np.remainder(apart + np.pi, tau) - np.pi
+            apart = np.remainder(apart + pi, tau) - pi
         apart, size = (
             np.hypot(*values.T) if values.ndim > 1 else abs(values)
             for values in (apart, exact[quantity])

@@ -5,6 +5,7 @@ Each is of a row that is measured, is reported with its reason, and costs the ru
 
 import math
 from functools import partial
+from math import nan, pi
 
 import numpy as np
 from click.testing import CliRunner
@@ -72,17 +73,17 @@ def test_every_contender_finds_the_same_unknowns(monkeypatch):
     loops, not_run = contenders.collect_loops()
     assert {"NumPy", "C"} == {*loops, *not_run}
     for name, loop in loops.items():
-        out = np.full((15, 500), np.nan)
+        out = np.full((15, 500), nan)
         loop(command.theta_2, out)
         off = out - expected
-        off[:2] = np.remainder(off[:2] + np.pi, 2 * np.pi) - np.pi
+        off[:2] = np.remainder(off[:2] + pi, 2 * pi) - pi
         assert (abs(off).max(axis=1) <= ROUNDING * abs(expected).max(axis=1)).all(), (
             name
         )
 
 
 @mark.parametrize("name", bench.SPEED_LIMITS)
-@mark.parametrize("factor", [math.nan, 1.01, 1.0])
+@mark.parametrize("factor", [nan, 1.01, 1.0])
 def test_what_is_beyond_its_limit_fails_with_the_reason(name, factor, monkeypatch):
     rows = {what: most for what, (most, _) in bench.SPEED_LIMITS.items()}
     rows["all, 1000 positions"] = 100.0

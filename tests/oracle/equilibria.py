@@ -10,7 +10,7 @@ Free bodies held at many positions between say that no equilibrium was missed.
 """
 
 from dataclasses import replace
-from math import inf, pi, remainder, sqrt
+from math import inf, nan, pi, remainder, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -80,7 +80,7 @@ def equilibria(question):
     if turns_fully(scene.linkage) and len(change_points(scene.linkage)) == 2:
         signs = find_signs(scene.linkage, theta_2, question.at.branch[0])
         for branch, torque in torques.items():  # one assembly is a circuit of its own
-            torque[signs != branch] = np.nan
+            torque[signs != branch] = nan
     judged = [
         (equilibrium, _judge_equilibrium(scene, equilibrium))
         for equilibrium in answer.found
@@ -171,7 +171,7 @@ def _hold(scene, angle, branch):
         answer = free_body.FreeBody().answer(scene, command)
         sine = np.sin(answer.quantities["theta_4"] - answer.quantities["theta_3"])
     sound = answer.assembled & (abs(sine) >= WELL_CONDITIONED)
-    return np.where(sound, answer.quantities["torque"], np.nan)
+    return np.where(sound, answer.quantities["torque"], nan)
 
 
 def _count_missed(scene, branch, theta_2, torque, places):
@@ -186,7 +186,7 @@ def _count_missed(scene, branch, theta_2, torque, places):
     counted = np.zeros(len(torque) - 1, dtype=int)
     open_steps = ~np.isfinite(torque[:-1] * torque[1:])
     for angle, off in places:
-        turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * np.pi)
+        turned = theta_2[0] + np.remainder(angle - theta_2[0], 2.0 * pi)
         index = np.searchsorted(theta_2, turned) - 1
         if 0 <= index < len(counted):
             counted[index] += 1

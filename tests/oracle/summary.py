@@ -117,7 +117,7 @@ class _SummaryJudge:
         if not isinstance(law, Sine):
             return self.edges
         turned = law.phase + law.frequency * law.duration
-        phases = np.arange(law.phase // np.pi, turned / np.pi) * np.pi + 0.5 * np.pi
+        phases = np.arange(law.phase // pi, turned / pi) * pi + 0.5 * pi
         turns = (phases - law.phase) / law.frequency
         return np.union1d(self.edges, turns[(turns > 0.0) & (turns < law.duration)])
 
@@ -125,7 +125,7 @@ class _SummaryJudge:
     def fine_places(self):
         """Return many places between the scene's own, the closest beside the edges."""
         intervals = min(PEAK_INTERVALS, MOST_INTERVALS // (len(self.swings) - 1))
-        graded = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, intervals + 1))
+        graded = 0.5 - 0.5 * np.cos(np.linspace(0.0, pi, intervals + 1))
         pieces = [low + (high - low) * graded for low, high in pairwise(self.swings)]
         return np.unique(np.concatenate(pieces))
 
@@ -378,7 +378,7 @@ def _judge_integrals(judged):
     for key, total in zip(("energy_in", "energy_out"), sums, strict=True):
         judged.add("integrals", divide(abs(entry[key] - total), most))
     if not entry["closed"]:
-        judged.add("integrals", 0.0 if entry["energy_swing"] is None else np.inf)
+        judged.add("integrals", 0.0 if entry["energy_swing"] is None else inf)
         return
     given = sums[0] - sums[1]
     surplus = panels.accumulate("power", given * second / np.ptp(judged.edges)) / second

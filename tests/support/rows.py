@@ -6,6 +6,8 @@ from pytest import mark, param, raises
 
 from fourbar import InputError
 
+each_branch = mark.parametrize("branch", [1, -1])
+
 
 def read_rows(table):
     """Return the cells of each line, without the spaces around them.

@@ -6,6 +6,7 @@ Against free bodies in balls, limiting cases, symmetry, power, and what is refus
 import math
 from dataclasses import replace
 from itertools import combinations
+from math import pi
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -95,7 +96,7 @@ PARALLEL = LinearDrive(Place(2, (0.05, 0.3)), Place(4, (0.05, 0.3)))
 def test_where_it_has_no_lever_or_no_direction_there_are_no_forces(
     lengths, drive, branch, status
 ):
-    angles = [0.0, 0.5, math.pi] if lengths == CRANK_ROCKER_LENGTHS else [0.4, 0.5, 1.0]
+    angles = [0.0, 0.5, pi] if lengths == CRANK_ROCKER_LENGTHS else [0.4, 0.5, 1.0]
     scene = Scene(uniform(*lengths), Motion(angles, 1.0, branch=branch), drive=drive)
     s = solve(scene, "error")
     assert s.status == status
@@ -168,10 +169,10 @@ def test_friction_at_rest_holds_as_much_force_as_its_work(start_bar, end_bar):
 def test_a_study_and_a_file_carry_a_force_at_a_point():
     scene = loads(HELD)
     assert loads(dump(scene)) == scene
-    keys = {"drive.direction": [math.pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
+    keys = {"drive.direction": [pi / 2, 1.2], "points.handle.from_pin.0": 0.1}
     varied = solve(vary(scene, keys))
     handle = Point("handle", 2, (0.1, 0.0))
-    for k, direction in enumerate((math.pi / 2, 1.2)):
+    for k, direction in enumerate((pi / 2, 1.2)):
         one = replace(
             scene,
             drive=replace(scene.drive, direction=direction),

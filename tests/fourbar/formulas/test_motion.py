@@ -11,6 +11,7 @@ from pytest import approx, mark
 from fourbar import Motion, Scene, solve
 from fourbar.formulas.arithmetic import dot
 from fourbar.formulas.path import NO_DIGIT_LEFT, compute_state
+from tests.support.rows import each_branch
 from tests.support.scenes import EPS, PARALLELOGRAM, bare, cis
 
 
@@ -40,7 +41,7 @@ def test_on_a_change_point_everything_is_the_limit_of_its_assembly():
 
 
 @mark.parametrize("theta_1", [0.0, 0.4, -2.5])
-@mark.parametrize("branch", [1, -1])
+@each_branch
 def test_a_kite_whose_A_lies_on_O4_lies_where_its_neighbours_do(branch, theta_1):
     """As theta_2 falls to theta_1 bars 3 and 4 come to lie together on the ground's
     line.

@@ -7,7 +7,7 @@ from fourbar.formulas.motion import coefficients, take_sines_of_rates
 from fourbar.formulas.path import compute_state, drive_sine_of_triangle
 from fourbar.formulas.position import close_loop, direction, half_angle, loop
 from tests.support.balls import move_in_balls
-from tests.support.rows import read_rows
+from tests.support.rows import each_branch, read_rows
 from tests.support.scenes import EPS, bare, cis
 
 FEW_ROUNDINGS = 8.0 * EPS
@@ -62,7 +62,7 @@ def test_digits_are_kept_where_the_diagonal_is_short(stated, psi, sign):
 
 
 @mark.parametrize("drive", [3, 4])
-@mark.parametrize("branch", [1, -1])
+@each_branch
 def test_the_sine_of_the_drive_keeps_its_digits_on_a_short_ground(branch, drive):
     lengths = loop(2.0**-14, 1.5, 0.75, 1.25)
     half = half_angle(lengths, 0.7)

@@ -37,7 +37,7 @@ from fourbar_validation.scenes.random import (
     draw_uniform,
 )
 from fourbar_validation.scenes.suites import list_model_files
-from tests.support.rows import read_rows, refused, slow_but
+from tests.support.rows import each_branch, read_rows, refused, slow_but
 from tests.support.scenes import WEIGHT, crank_rocker
 
 GAP = 1e-4
@@ -91,7 +91,7 @@ def opened(scene):
     return model, data
 
 
-@mark.parametrize("branch", [1, -1])
+@each_branch
 @mark.parametrize(
     "lengths, points",
     read_rows("""

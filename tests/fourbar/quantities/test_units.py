@@ -6,8 +6,8 @@ The same numbers as SI gives, and one line for a mistake.
 import json
 import re
 from fractions import Fraction
+from math import pi
 
-import numpy as np
 from pytest import approx, mark, raises
 
 import fourbar
@@ -15,7 +15,7 @@ from fourbar import InputError, Load, Motion, Place, Spring, Sweep
 from fourbar.quantities.units import UnitError, half_unit_of_text, to_si
 from tests.support.rows import read_rows
 
-ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, np.pi))
+ENDS = Place(1, (0.1, 0.0)), Place(4, (0.2, pi))
 STATED = read_rows("""
 Bar | ["9 cm", "2 g", "2 g m^2", ["5 cm", "180 deg"]] | [0.09, 0.002, 0.002, [0.05, PI]]
 uniform | ["6 in", 0.05, "127 mm", "4 in"] | [0.1524, 0.05, 0.127, 0.1016]
@@ -35,7 +35,7 @@ Torsion | [[["A", "2 N m/rad", "180 deg", "1 N cm"]]] | [[["A", 2.0, PI, 0.01]]]
 
 def read(cell):
     """Read a list of JSON, in which PI is a number."""
-    return json.loads(cell.replace("PI", repr(np.pi)))
+    return json.loads(cell.replace("PI", repr(pi)))
 
 
 SAME = [
@@ -43,12 +43,12 @@ SAME = [
     (
         lambda bar, force, at, moment: Load(bar, force, from_pin=at, moment=moment),
         (4, ("2 kN", "180 deg"), ("5 cm", 0), "3 N cm"),
-        (4, (2000.0, np.pi), (0.05, 0.0), 0.03),
+        (4, (2000.0, pi), (0.05, 0.0), 0.03),
     ),
     (
         lambda *swept: Motion(Sweep(*swept)),
         ("180 deg", "2 rad", 4),
-        (np.pi, 2.0, 4),
+        (pi, 2.0, 4),
     ),
     (
         Spring,

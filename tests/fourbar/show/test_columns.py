@@ -1,7 +1,7 @@
 """Columns by name: sizes, components and ratios."""
 
 from dataclasses import replace
-from math import remainder, tau
+from math import pi, remainder, tau
 
 import numpy as np
 from pytest import approx, mark
@@ -110,11 +110,11 @@ def test_a_difference_of_angles_goes_on_from_its_first_position():
 
     theta_4 - theta_2 is -1.4 turns of bar 2 at first where that is commanded so.
     """
-    start = 2.0 * np.pi + 5.0
+    start = 2.0 * pi + 5.0
     scene = replace(TURN, motion=Motion(Sweep(start, start + 2.0 * tau, 100), 10.0))
     solution = solve(scene)
     (difference,) = columns(scene, "theta_2 - theta_4").values()
-    assert -np.pi < difference[0] <= np.pi
+    assert -pi < difference[0] <= pi
     gained = solution.theta_2 - solution.theta_4
     assert np.ptp(difference - gained) < 1e-12
     assert abs(remainder(difference[0] - gained[0], tau)) < 1e-12

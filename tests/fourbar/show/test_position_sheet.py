@@ -5,6 +5,7 @@ Every number is that of the solution, in the units of the scene.
 
 import re
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 from pytest import approx, mark
@@ -68,7 +69,7 @@ def test_what_a_scene_has_not_is_left_out(motion, rates):
 
 
 def test_rounding_is_shown_as_zero_and_a_far_centre_by_a_dash():
-    lift = Scene(UNIFORM_PARALLELOGRAM, Motion(np.pi / 2.0, 1.0))
+    lift = Scene(UNIFORM_PARALLELOGRAM, Motion(pi / 2.0, 1.0))
     text = "\n".join(
         line
         for sheet in [PositionSheet(solve(lift), COMMON)]
@@ -98,9 +99,9 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
     rows = PositionSheet(solve(scene), COMMON).write_ratios()
     (row,) = [row for row in rows if row.startswith("F_jaw/drive_force")]
     ratio = numbers(row)[0]
-    assert ratio == approx(31.969 * np.sin(np.pi / 3.0), rel=2e-5)
+    assert ratio == approx(31.969 * np.sin(pi / 3.0), rel=2e-5)
     assert not any(row.startswith("F_handle/drive_force") for row in rows)
-    held = Load(4, (1.0, -0.5 * np.pi), point="jaw", frame="bar")
+    held = Load(4, (1.0, -0.5 * pi), point="jaw", frame="bar")
     loaded = solve(replace(scene, loads=(held,)))
     assert 1.0 / loaded.drive_force[0] == approx(ratio, rel=SIX_DIGITS)
 
@@ -108,7 +109,7 @@ def test_the_force_of_a_drive_is_related_to_that_of_a_point():
 PARALLELOGRAM = FourBar(0.3, Bar(0.1, 0.1), Bar(0.3, 0.3), Bar(0.1, 0.1))
 """Uniform bars of 1 kg/m, all in one line at theta_2 = 0 and 180 deg."""
 ALONG = Gravity(9.81, 0.0)
-ACROSS = Gravity(9.81, -0.5 * np.pi)
+ACROSS = Gravity(9.81, -0.5 * pi)
 LIMITS = "on the change point: the limits from both sides"
 
 
@@ -121,7 +122,7 @@ def write_forces(motion, gravity=ALONG, at=None, **parts):
     return PositionSheet(solution, units("N m")).write_pin_forces(), solution
 
 
-@mark.parametrize("theta_2, sense", ((0.0, 1.0), (np.pi, -1.0)))
+@mark.parametrize("theta_2, sense", ((0.0, 1.0), (pi, -1.0)))
 def test_pin_forces_that_are_bounded_on_a_change_point_have_their_limit(theta_2, sense):
     """Weights along the line of all bars ask for no moment there.
 
@@ -192,8 +193,8 @@ def test_a_rate_within_the_rounding_of_its_place_is_zero_and_an_angle_is_not():
     assert rows[3].split()[3] == "0" and rows[2].split()[3] != "0"
     parallel = PositionSheet(solve(scene, at=locate(scene, "theta_3", "max")), COMMON)
     assert parallel.write_ratios()[4].split()[2] == "-"
-    turned = Scene(PARALLELOGRAM, Motion(Sweep(0.0, 2.0 * np.pi, 4), 1.0))
-    one = solve(turned, at=command_at(turned, np.array([2.0 * np.pi])))
+    turned = Scene(PARALLELOGRAM, Motion(Sweep(0.0, 2.0 * pi, 4), 1.0))
+    one = solve(turned, at=command_at(turned, np.array([2.0 * pi])))
     course.follow(turned, one)
     rows = PositionSheet(one, units("N m")).write_bars()
     assert rows[3].split()[2] == "6.2832"

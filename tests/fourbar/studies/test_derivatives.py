@@ -28,6 +28,7 @@ from fourbar.show.studies import write_sensitivity
 from fourbar.studies.keys import list_entries, read_place
 from fourbar_validation.places import MODELS
 from tests.fourbar.studies.test_study import ANGLES, LINK, RUBBING, scene
+from tests.support.rows import each_branch
 from tests.support.scenes import PARALLELOGRAM, WEIGHT, cis, find_angle
 
 EXACT = 1e-10
@@ -118,7 +119,7 @@ def differ_by_a_study(nominal, key, name="theta_3"):
     return np.angle(cis(above - below)) / (2.0 * step)
 
 
-@mark.parametrize("branch", [1, -1])
+@each_branch
 @mark.parametrize(
     "lengths, command",
     [

@@ -38,7 +38,7 @@ from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.studies import write_equilibria
 from fourbar.studies.circuit_curve import POSITIONS_OF_A_BRANCH, CircuitCurve
 from fourbar_validation.places import MODELS
-from tests.support.rows import slow_but
+from tests.support.rows import each_branch, slow_but
 from tests.support.scenes import (
     MASSLESS,
     balanced_lamp,
@@ -233,7 +233,7 @@ BACK = Sweep(radians(500.0), radians(-100.0), 300)
 
 
 @mark.slow
-@mark.parametrize("branch", [1, -1])
+@each_branch
 @mark.parametrize(
     "lengths, swept",
     [

@@ -5,6 +5,7 @@ What no scene takes has a status.
 
 import json
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
@@ -226,11 +227,11 @@ def test_texts_with_units_are_the_numbers():
         "bars.coupler.centre.1": "180 deg",
         "effects.torsion.B.rest": 0.5,
     }
-    si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": np.pi}
+    si = texts | {"lengths.input": [0.1, 0.1016, 0.1], "bars.coupler.centre.1": pi}
     theta = {"motion.theta_2": [["10 deg", "0.5 rev"], [0.1, 0.2], ["1 rad", 0]]}
     from_texts, from_si = vary(case, texts | theta), vary(case, si)
     assert all((from_texts.values[key] == from_si.values[key]).all() for key in si)
-    angles = [[np.radians(10.0), np.pi], [0.1, 0.2], [1.0, 0.0]]
+    angles = [[np.radians(10.0), pi], [0.1, 0.2], [1.0, 0.0]]
     assert (from_texts.at.angle == angles).all()
     assert Tolerance("lengths.input", "0.1 mm") == Tolerance("lengths.input", 1e-4)
     for key, text, words in read_rows("""
@@ -254,7 +255,7 @@ def test_a_torsion_spring_is_followed_from_where_each_member_begins():
     """Each member is that linkage alone: two of them assemble later in the sweep."""
     spring = Torsion.at(A=(10.0, 1.5, 0.0), B=(10.0, -1.5, 0.0))
     motion = Motion(Sweep(0.0, np.radians(359.0), 80), 1.0, branch=-1)
-    linkage = FourBar(6.0, Bar(4.0, 1.0), Bar(5.0, 1.0), Bar(3.0, 1.0), np.pi)
+    linkage = FourBar(6.0, Bar(4.0, 1.0), Bar(5.0, 1.0), Bar(3.0, 1.0), pi)
     scene = Scene(linkage, motion, effects=(spring,))
     coupler = [5.0, 2.2, 7.7]
     study = solve(vary(scene, {"lengths.coupler": coupler}))

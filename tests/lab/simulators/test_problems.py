@@ -71,7 +71,7 @@ def assert_agreement(name, answers, share=0.0):
         apart = find_distance(values, answers[quantity])
         size = find_distance(values, 0.0).max()
         if quantity.startswith("theta"):
-            apart = np.minimum(apart, abs(apart - 2.0 * np.pi))
+            apart = np.minimum(apart, abs(apart - 2.0 * pi))
             size = 1.0
         allowed = np.asarray(problem["errors"][quantity]) + share * size
         assert (apart <= allowed).all(), quantity

@@ -4,6 +4,7 @@ The unit of an error where nothing is allowed is tested too.
 """
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 from pytest import approx, mark
@@ -36,7 +37,7 @@ def judge_quantity(
         ones,
         mask,
         tolerance,
-        np.nan * ones,
+        nan * ones,
     )
     return judge_errors(errors, predicted)
 
@@ -64,7 +65,7 @@ def test_within_what_is_allowed_no_prediction_is_needed_and_no_number_fails():
     worst = judge_quantity(1e-15, 9e-15, 0.0)
     assert (worst.position, worst.verdict, worst.decided) == (1, AGREES, 3)
     for allowed, verdict in ((0.9, FAILS), (1.0, UNDECIDED)):
-        worst = judge_quantity(np.nan, 0.0, allowed=allowed)
+        worst = judge_quantity(nan, 0.0, allowed=allowed)
         assert (worst.position, worst.verdict) == (0, verdict)
         assert worst.reason.startswith("NaN") == (verdict == FAILS)
 
@@ -102,5 +103,5 @@ def test_a_prediction_of_the_whole_value_leaves_no_digit_but_in_a_unit_of_its_ow
         worst = judge_quantity(1.0, predicted=np.array([2.0]), **changes)
         assert worst.verdict == verdict
     for predicted, verdict in ((2.0, FAILS), (np.inf, UNDECIDED)):
-        worst = judge_quantity(np.nan, predicted=np.array([predicted]))
+        worst = judge_quantity(nan, predicted=np.array([predicted]))
         assert worst.verdict == verdict

@@ -1,12 +1,12 @@
 """What an engine is told, and at what its answer is taken."""
 
 import numpy as np
-import pytest
 
 import fourbar
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.asking import ask_at
+from tests.support.rows import each_branch
 
 
 class Told:
@@ -20,7 +20,7 @@ class Told:
         return Answer(self.name, "exact", at=self.at or command)
 
 
-@pytest.mark.parametrize("branch", [1, -1])
+@each_branch
 def test_an_engine_is_told_the_sign_and_answers_at_the_assembly(branch):
     """With a single change point the sign is back after two turns alone.
 

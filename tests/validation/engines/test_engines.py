@@ -36,7 +36,7 @@ from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.here import judge_by
-from tests.support.rows import slow_but
+from tests.support.rows import each_branch, slow_but
 from tests.support.scenes import (
     UNIFORM,
     crank_rocker,
@@ -245,7 +245,7 @@ def test_agrees_to_round_off(name, kind):
 
 @each_engine
 @mark.parametrize("offset", [1e-3, 1e-6, 1e-9, 1e-12])
-@mark.parametrize("branch", [1, -1])
+@each_branch
 def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
     for sign in (1, -1):
         answer = answered(name, at_limit(TRIPLE_ROCKER, sign * offset, branch))

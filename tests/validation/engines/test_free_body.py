@@ -159,8 +159,7 @@ def test_what_brakes_takes_the_power_that_the_drive_gives_more(key):
         loss = loss + prod(numbers) * slip * size
     more = 10.0 * (braked["torque"] - answered(crank_rocker(effects=()))["torque"])
     assert (loss > 0.0).all()
-    allowed = 1e-12 * 10.0 * abs(braked["torque"]).max()
-    assert more == approx(loss, abs=allowed, rel=0)
+    assert more == approx(loss, abs=1e-12 * 10.0 * abs(braked["torque"]).max(), rel=0)
 
 
 @mark.parametrize(

@@ -6,7 +6,7 @@ What is stated comes back bit for bit, and what is wrong is said in a line.
 import json
 from dataclasses import replace
 from functools import partial
-from math import pi
+from math import nan, pi
 
 import numpy as np
 from numpy.testing import assert_array_equal, assert_equal
@@ -94,7 +94,7 @@ def test_every_scene_and_command_comes_back_bit_for_bit():
         sent = through_text(protocol.command_to_json(scene, commanded))
         told, command = protocol.command_from_json(back, sent)
         if scene.motion.stroke is not None:
-            none = np.full_like(commanded.angle, np.nan)
+            none = np.full_like(commanded.angle, nan)
             commanded = commanded._replace(
                 angle=none,
                 speed=None if commanded.speed is None else none,
@@ -172,7 +172,7 @@ def test_an_answer_comes_back_with_all_that_it_says():
         angle=commanded.angle + 1e-3, speed=np.full(n, 10.01), acceleration=5.0
     )
     torque, here = np.linspace(0.0, 1.0, n), np.arange(n) != 3
-    torque[~here] = np.nan
+    torque[~here] = nan
     said = {
         "setting": "RK4",
         "assembled": here,

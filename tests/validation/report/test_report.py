@@ -155,9 +155,9 @@ def test_the_errors_drawn_are_the_largest_of_their_stretches():
         assert len(worst) == STRETCHES
         assert int(np.argmax(error)) in worst
         assert np.all(np.diff(np.roll(worst, -int(np.argmin(worst)))) > 0)
-    error[worst[3]] = np.nan
+    error[worst[3]] = nan
     assert worst[3] not in find_worst_of_segments(error, 0.9)
-    assert len(find_worst_of_segments(np.full(40, np.nan), 0.0)) == 0
+    assert len(find_worst_of_segments(np.full(40, nan), 0.0)) == 0
     assert len(find_worst_of_segments(np.array([LEAST_DRAWN_ERROR]), 0.5)) == 1
 
 
@@ -464,8 +464,7 @@ def test_who_alone_answers_a_quantity_is_believed_if_fourbar_is_wrong(
 def test_pin_forces_of_which_one_fails_do_not_agree():
     """Its row is fourbar's cause, as two other engines blame fourbar for it."""
     wrong = (fail(mine(name)) for name in ("F12", "torque"))
-    against = {"F12": ["one", "two"]}
-    summary = summary_of_rows(*wrong, mine("F14"), against=against)
+    summary = summary_of_rows(*wrong, mine("F14"), against={"F12": ["one", "two"]})
     causes = {cause.engine: cause.text for cause in summary.causes}
     assert causes["mine"] == "torque differs; mistakes are not looked for there"
 

@@ -20,6 +20,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.scene_record import Record
 from fourbar_validation.run import released as free
 from fourbar_validation.run.judge import judge, judge_for_report, make_question
+from tests.support.rows import each_branch
 from tests.support.scenes import UNIFORM_PARALLELOGRAM, WEIGHT, recommand, relink
 
 
@@ -117,7 +118,7 @@ def test_every_engine_is_judged_through_limits_and_change_points(coupler):
         assert row(rows, engine, "theta_2").error < BEFORE_THE_LINE
 
 
-@mark.parametrize("branch", [1, -1])
+@each_branch
 def test_a_linkage_that_friction_holds_beyond_a_change_point_is_judged_as_it_stands(
     branch,
 ):

@@ -1,6 +1,7 @@
 """Scenes stated otherwise have the same numbers, and one that has not fails its row."""
 
 from itertools import product
+from math import pi
 
 import numpy as np
 from pytest import mark
@@ -144,7 +145,7 @@ def test_an_assembly_through_change_points_is_the_same_however_it_is_stated(
     """Lengths of ground, input, coupler and output, whose bars come in line."""
     judged = 0
     # a sweep of each quarter, in the turn of the ground's angle and in two others
-    quarters = np.arange(0.2, 2.0 * np.pi, 0.5 * np.pi)
+    quarters = np.arange(0.2, 2.0 * pi, 0.5 * pi)
     turns = np.array((0.0, 0.0, 6.28, -12.56))
     for start, branch in product(quarters + turns, (1, -1)):
         angles = Sweep(start, start + 1.5, 5)
@@ -234,7 +235,7 @@ def test_a_field_that_forgets_the_ground_fails_where_it_is_turned(monkeypatch):
     held = crank_rocker().linkage.ground_angle
 
     def turn(load):
-        return field(load) * cis(load.angle + 0.5 * np.pi - held)
+        return field(load) * cis(load.angle + 0.5 * pi - held)
 
     monkeypatch.setattr(Gravity, "field", property(turn))
     _, rows = ask(crank_rocker())

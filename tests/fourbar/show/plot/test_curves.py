@@ -4,6 +4,7 @@ A path runs along its curve: no false corner, through both branches.
 """
 
 import re
+from math import pi
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,7 +22,7 @@ from tests.support.rows import read_rows
 from tests.support.scenes import WEIGHT, bare, crank_rocker
 from tests.support.texts import COORDINATES
 
-SCENE = crank_rocker(Motion(Sweep(0.0, 2.0 * np.pi, 120), 10.0), effects=WEIGHT)
+SCENE = crank_rocker(Motion(Sweep(0.0, 2.0 * pi, 120), 10.0), effects=WEIGHT)
 DEGREES = np.linspace(0.0, 360.0, 121)
 LONGEST = 2.0 / 150.0
 """Of a chord of a drawn path, as a part of its extent: 2 mm in a figure of 150 mm."""
@@ -62,7 +63,7 @@ def test_curves_are_columns_in_the_unit_of_their_axis(figure, name, column):
 @mark.slow
 def test_what_a_clipped_axis_leaves_out_is_a_pure_number():
     """A ratio has no prefix: a thousand is no "k1"."""
-    scene = crank_rocker(Motion(Sweep(0.0, 2.0 * np.pi, 3601), 10.0))
+    scene = crank_rocker(Motion(Sweep(0.0, 2.0 * pi, 3601), 10.0))
     caption = draw_figure(scene, "ratios").figure.subfigs[0].get_supxlabel()
     assert re.search(
         r"clipped at [\d.]+; the largest evaluated, T₄/T₂ = −?\d{4,}",
@@ -140,7 +141,7 @@ def test_a_falling_sweep_is_drawn_with_the_turns_of_its_own_order():
         Motion(Sweep(4.5, 1.5, 9), 1.0), linkage=bare(0.3, 0.1, 0.25, 0.22, 1.0)
     )
     drawn = make_view(scene).sweep.theta_4[::-1]
-    assert drawn == approx(solve(scene).theta_4) and drawn[-1] < -np.pi < drawn[0]
+    assert drawn == approx(solve(scene).theta_4) and drawn[-1] < -pi < drawn[0]
 
 
 def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
@@ -154,7 +155,7 @@ def test_the_centres_of_a_drawing_are_moved_by_its_origin_once():
 
 def test_a_clipped_end_of_what_friction_holds_is_named_by_its_column():
     friction = Friction.at(O2=2.0)
-    turn = Motion(Sweep(0.0, 2.0 * np.pi, 200), 0.0)
+    turn = Motion(Sweep(0.0, 2.0 * pi, 200), 0.0)
     view = make_view(crank_rocker(turn, drive_bar=4, effects=(friction,)))
     draw_chart(Figure().subplots(), view, CHARTS["drive"])
     assert re.search(r"evaluated, torque_(low|high)\s=\s", view.notes[-1])
