@@ -209,12 +209,15 @@ class Panels:
         series = np.nan_to_num(self.curves[name].series[..., 0])
         series[:, 0] -= level
         rising = legint(series.T, lbnd=-1.0).T
-        integrals = [np.zeros(1)]
-        for panel, half in enumerate(0.5 * self.share * self.length):
-            stops = np.append(_find_panel_zeros(series[panel]), 1.0)
-            until = half * legval(stops, rising[panel])
-            integrals.append(integrals[-1][-1] + until)
-        return np.concatenate(integrals)
+        half = 0.5 * self.share * self.length
+        whole = 2.0 * half * series[:, 0]
+        integrals = [0.0]
+        for panel, terms in enumerate(series):
+            begin = integrals[-1]
+            zeros = _find_panel_zeros(terms)
+            until = [half[panel] * legval(zero, rising[panel]) for zero in zeros]
+            integrals += [begin + more for more in (*until, whole[panel])]
+        return np.array(integrals)
 
     def find_zeros(self, name: str) -> Array:
         """Find the places at which a curve changes its sign, in order."""
