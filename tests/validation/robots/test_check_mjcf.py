@@ -23,6 +23,7 @@ from fourbar.effects import Friction, Gravity, Place, Spring, Springs, Torsion
 from fourbar.errors import InputError
 from fourbar.mjcf import Plane, write_mjcf
 from fourbar.quantities import PIN_FORCES, UNKNOWNS
+from fourbar.scene import command
 from fourbar.solving import solve
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.results_file import read_columns
@@ -65,7 +66,7 @@ from tests.support.robots import (
     notes_of,
 )
 from tests.support.rows import read_rows
-from tests.support.scenes import recommand
+from tests.support.scenes import low_parallelogram, recommand
 from tests.support.texts import put
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
@@ -472,6 +473,15 @@ def test_an_entry_that_cannot_stand_alone_has_no_price():
     assert mend(scene, GENERATED, {}, changes) == [None] * 3
     ones = (Difference(key, "", theirs, "") for key, theirs in changes)
     assert not any(change_scene(scene, one) for one in ones)
+
+
+def test_a_length_costs_little_beyond_a_change_point_too():
+    """It does not turn a parallelogram over, nor wind its spring."""
+    scene = replace(low_parallelogram(), effects=(Torsion.at(O4=(1.0, 0.0, 0.0)),))
+    length = scene.linkage.output.length
+    one = Difference("lengths.output", length, length * (1.0 + 1e-9), "")
+    answer = answer_changed(scene, one, command(scene))
+    assert price(one, rows_of(scene, [answer]), ()).cost < 1e-7
 
 
 def mend_settings(first=0):

@@ -13,7 +13,7 @@ import numpy as np
 from fourbar.formulas.mobility import change_points
 from fourbar.linkage import record
 from fourbar.quantities import COUPLE, OK, UNKNOWNS, Array
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -25,6 +25,8 @@ from fourbar_validation.compare.tolerance import (
     TIMES_PREDICTED,
     ErrorBound,
     Mask,
+    divide,
+    find_condition,
     hold_simulated,
 )
 from fourbar_validation.engines.description import name_driving
@@ -70,7 +72,8 @@ _MOST_ALLOWED = 0.1
 MuJoCo's stiffest constraint leaves in it.
 """
 _BY_STIFFEST = (
-    "as what MuJoCo's stiffest constraint (solimp 0.9999) leaves in this file"
+    "as what MuJoCo's stiffest constraint (solimp 0.9999) and the rounding of lengths"
+    " leave in this file"
 )
 """Method by which the error of a file is predicted that nobody holds to another."""
 _ADVICE = (
@@ -102,9 +105,10 @@ class LoopJudgement:
         if soft and not self.counts[FAILS]:
             softest = max(soft, key=lambda row: row.error)
             left = write_error(softest.allowed / TIMES_PREDICTED)
+            rounded = self.measured.rounding and ", with the rounding of lengths,"
             yield (
                 "The file is right as far as MuJoCo's constraints let it be: the "
-                f"stiffest (solimp 0.9999) leaves at least {left} of"
+                f"stiffest (solimp 0.9999){rounded or ''} leaves at least {left} of"
                 f" {softest.quantity} in it."
             )
         if self.is_of_another_linkage:
@@ -217,12 +221,17 @@ def _price(
 def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:
     """Answer with the formulas of a scene that has one entry as in their file.
 
-    None where a scene cannot have it.
+    The bars stay in the assembly nearest to that of the scene, beyond a change point
+    too. None where a scene cannot have it.
     """
     changed = change_scene(scene, one)
     if changed is None:
         return None
-    solution = solve(changed, "force", at=at)
+    signs = find_signs(scene.linkage, at.angle, at.branch, at.bar)
+    branch = find_signs(changed.linkage, at.angle, signs, at.bar)
+    motion = replace(scene.motion, branch=int(branch[0]))
+    changed = replace(changed, motion=motion)
+    solution = solve(changed, "force", at=at._replace(branch=branch))
     names = {*JUDGED_QUANTITIES} - {COUPLE.value} | {name_driving(scene)}
     quantities = {name: np.asarray(getattr(solution, name)) for name in names}
     closed = solution.status_code == OK
@@ -264,6 +273,8 @@ def judge_answers(
     if at.bar != 2:
         judged += ["theta_2", "omega_2"]
     rows = []
+    # to the first order, and a tenth more where the bars are nearly in line
+    rounding = 1.1 * measured.rounding / max(scene.linkage.lengths)
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
 
@@ -271,9 +282,13 @@ def judge_answers(
             quantity: str, mask: Mask, formulas: Solution = formulas
         ) -> Array:
             left = (softness or {}).get(_name_force(scene, quantity), 0.0)
-            largest = measure_sizes(getattr(formulas, quantity))[mask].max()
-            most = _MOST_ALLOWED * largest / TIMES_PREDICTED
-            return np.full(len(mask), min(left, most))
+            of_formulas = measure_sizes(getattr(formulas, quantity))[mask]
+            units = {"theta": 1.0, "omega": measure_sizes(formulas.at.speed).max()}
+            unit = float(units.get(quantity[:5], of_formulas.max()))
+            condition = find_condition(quantity, scene.linkage, formulas)
+            turned = divide(rounding * unit, condition)
+            allowed = turned + TIMES_PREDICTED * left
+            return np.minimum(allowed, _MOST_ALLOWED * unit) / TIMES_PREDICTED
 
         held = Demands(tolerance, judged)
         if softness:

@@ -10,6 +10,8 @@ import pytest
 from pytest import approx
 
 from fourbar.formulas.mobility import classify
+from fourbar_validation.compare.rows import DEGRADED, FAILS
+from fourbar_validation.compare.tolerance import SIMULATED
 from fourbar_validation.engines.mujoco.describe import describe_model
 from fourbar_validation.engines.mujoco.robots.inside import (
     RESIDUAL_OF_AN_OPEN_LOOP,
@@ -18,10 +20,12 @@ from fourbar_validation.engines.mujoco.robots.inside import (
 from fourbar_validation.engines.mujoco.robots.loop_scene import find_rounding
 from fourbar_validation.engines.mujoco.robots.measure import POSITIONS_OF_A_LOOP
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
+from fourbar_validation.robots.judge_loop import FILE_AT_ONE_STATE, list_rows
 from fourbar_validation.robots.loop_errors import RIGID, list_errors_by_method
 from tests.support.robots import (
     AS_DRAWN,
     FOOT_PARALLELOGRAM,
+    examine_text,
     file_of,
     measure,
     pose_loop,
@@ -30,6 +34,7 @@ from tests.support.robots import (
 )
 from tests.support.rows import read_rows, slow_but
 
+FOLLOWS = ("theta_3", "theta_4", "omega_3", "omega_4")
 ANCHOR = 'anchor="-0.06 0 0"'
 QUATERNION = "0.982434 0 0.18661 0"
 ROD = "-0.055821 0 0.022"
@@ -196,6 +201,20 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
             assert error.part < 0.01
             relative = loop.rounding / min(loop.scene.linkage.lengths)
             assert error.median < ROUNDINGS * relative
+
+
+@pytest.mark.parametrize("text", [FREE, FIVE_DIGITS, LARGE])
+def test_the_digits_of_a_file_are_no_error_of_its_motion(text):
+    """Over the full turn of its own scene, at single states."""
+    scene = read_scene(text, speed=1.0).scene
+    measured = examine_text(scene, text).measured
+    for rounding, verdict in ((measured.rounding, DEGRADED), (0.0, FAILS)):
+        known = replace(measured, rounding=rounding)
+        rows = list_rows("foot", known, SIMULATED, {"torque": 0.0})
+        motion = {
+            row.quantity: row.verdict for row in rows if row.engine == FILE_AT_ONE_STATE
+        }
+        assert {motion[name] for name in FOLLOWS} == {verdict}
 
 
 def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
