@@ -1,6 +1,7 @@
 """The files of the checkout, and Python in a process of its own."""
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -15,6 +16,11 @@ BUSY = max(1.0, LOAD / (os.cpu_count() or 1))
 def read(name):
     """Return the text of a file, by its path or its name in the checkout."""
     return (ROOT / name).read_text("utf-8")
+
+
+def find_lines(pattern, text):
+    """Return what a pattern matches in a text, ^ and $ at the ends of its lines."""
+    return re.findall(pattern, text, re.MULTILINE)
 
 
 def read_table(page, name):

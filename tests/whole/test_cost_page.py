@@ -19,7 +19,7 @@ from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP
 from fourbar_validation.engines.mujoco.defaults import restore_defaults
 from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
 from fourbar_validation.report.svg import write_alone
-from tests.support.checkout import ROOT, read, read_table
+from tests.support.checkout import ROOT, find_lines, read, read_table
 
 PAGE = read("docs/cost.md")
 README = read("README.md")
@@ -77,7 +77,7 @@ def test_the_first_sentences_are_those_of_the_table():
     assert f"MuJoCo's defaults cost {default[4]} ms for two digits" in PAGE
     assert f"Six digits of every pin force cost MuJoCo {six[4]} ms" in README
     assert f"This costs {six[4]} ms of processor time" in README
-    (friction,) = re.findall(r"^\|friction\|[^|]*\|\+([^|]*)\|", PAGE, re.MULTILINE)
+    (friction,) = find_lines(r"^\|friction\|[^|]*\|\+([^|]*)\|", PAGE)
     assert f"Dry friction adds {friction} to a step" in README
     assert 1e-3 < float(default[3]) < 1e-2
 

@@ -24,7 +24,7 @@ from fourbar_validation.cli import group as harness
 from fourbar_validation.cli import status as run_harness
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.scenes.suites import read_suite
-from tests.support.checkout import ROOT, read
+from tests.support.checkout import ROOT, find_lines, read
 from tests.support.here import judge_here
 
 DOCS = ROOT / "docs"
@@ -71,7 +71,7 @@ def test_the_examples_of_continuous_integration_use_commands_that_exist():
 
 
 def test_every_long_part_is_run_in_the_night():
-    parts = re.findall(r"^LONG [:+]= (.*)$", read("Makefile"), re.MULTILINE)
+    parts = find_lines(r"^LONG [:+]= (.*)$", read("Makefile"))
     (nightly,) = re.findall(r"part: \[(.*)\]", read(".github/workflows/nightly.yml"))
     assert nightly.split(", ") == " ".join(parts).split()
 
@@ -95,7 +95,7 @@ def checkout(tmp_path, monkeypatch):
 
 def test_the_readme_goes_on_from_its_first_scene(checkout, capsys):
     """The commands and the call that stand in its sentences."""
-    begin, *_ = re.findall(r"^\$ fourbar (new .*)$", read("README.md"), re.MULTILINE)
+    begin, *_ = find_lines(r"^\$ fourbar (new .*)$", read("README.md"))
     sentences = read("README.md").partition("rounding changes none")[2]
     at, pins, _ = re.findall(r"`fourbar ((?:analyze|new|edit) .*?)`", sentences)
     for command in (begin, at, pins):
@@ -160,10 +160,9 @@ def test_every_other_command_line_is_one_that_its_program_takes(page):
         r" [^`]+)`",
         text,
     )
-    lines += re.findall(
+    lines += find_lines(
         r"^((?:python -m |fourbar-)(?:validation|fourbar_lab) .*)$",
         "".join(blocks("sh", text)),
-        re.MULTILINE,
     )
     for line in lines:
         words = shlex.split(line.removeprefix("python -m "), comments=True)
@@ -216,7 +215,7 @@ def test_every_command_is_listed(page, heading, program):
 
 def anchors(page):
     """Return the anchors of the headings, as GitHub and the site name them."""
-    headings = re.findall(r"^#+ (.*)$", read(page).lower(), re.MULTILINE)
+    headings = find_lines(r"^#+ (.*)$", read(page).lower())
     return {re.sub(r"[^\w\- ]", "", words).replace(" ", "-") for words in headings}
 
 
@@ -238,7 +237,7 @@ def test_the_index_lists_every_page_for_readers_and_for_the_site():
     } - {"index.md"}
     assert pages == set(re.findall(r"\]\(([^)]+\.md)\)", text))
     trees = "".join(blocks(r"\{toctree\}", text))
-    listed = re.findall(r"^(?!:)(?:.* <)?(.*?)>?$", trees, re.MULTILINE)
+    listed = find_lines(r"^(?!:)(?:.* <)?(.*?)>?$", trees)
     assert sorted(pages) == sorted(f"{name}.md" for name in listed if name)
 
 
@@ -262,7 +261,7 @@ def test_no_table_is_wider_than_the_column_of_a_page(page):
     """A cell breaks between words, so its longest word decides."""
     prose = re.sub(r"^(```|\$\$).*?\1$", "", read(page), flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"\[([^]\n]*)\]\([^)\n]*\)", r"\1", prose)
-    for table in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+    for table in find_lines(r"(?:^\|.*\n)+", text):
         head, _, *rows = (line.strip("|").split("|") for line in table.splitlines())
         width = 0
         for column in zip(head, *rows, strict=False):
@@ -277,8 +276,8 @@ def measure_word(word):
 def test_the_reference_of_the_commands_lists_every_option():
     commands = commands_of(group)
     reference = runpy.run_path(DOCS / "commands.py")["text"]()
-    assert re.findall(r"^## (\w+)$", reference, re.MULTILINE) == [*commands]
-    described = re.findall(r"^\| `(-.*?)` \|", reference, re.MULTILINE)
+    assert find_lines(r"^## (\w+)$", reference) == [*commands]
+    described = find_lines(r"^\| `(-.*?)` \|", reference)
     names = {name.split()[0] for row in described for name in row.split(", ")}
     for command in commands.values():
         for option in command.params:

@@ -27,7 +27,7 @@ from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
-from tests.support.checkout import read
+from tests.support.checkout import find_lines, read
 from tests.support.here import judge_here
 from tests.support.scenes import crank_rocker
 
@@ -48,9 +48,7 @@ def results(tmp_path_factory):
 
 
 def test_every_column_is_described_with_its_type():
-    described = dict(
-        re.findall(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE, re.MULTILINE)
-    )
+    described = dict(find_lines(r"^\| `(\w+)` \| (string|double|boolean) \|", PAGE))
     assert tuple(described) == RESULT_COLUMNS
     assert {field.name: field.type for field in dataclasses.fields(Row)} == {
         k: TYPES[t] for k, t in described.items()
@@ -61,7 +59,7 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit():
     table = PAGE.partition("| stage | quantities and units |")[2].partition("\n\n")[0]
     described = {
         (stage, name, unit)
-        for stage, groups in re.findall(r"^\| (\w+) \| (.+) \|$", table, re.MULTILINE)
+        for stage, groups in find_lines(r"^\| (\w+) \| (.+) \|$", table)
         for names, unit in re.findall(r"((?:`\w+`(?:, )?)+) ([^`;]+)", groups)
         for name in re.findall(r"`(\w+)`", names)
     }
@@ -73,7 +71,7 @@ def test_every_quantity_stands_in_the_row_of_its_stage_with_its_unit():
 
 def test_every_engine_is_described():
     table = PAGE.partition("## The engines")[2].partition("## The quantities")[0]
-    described = re.findall(r"^\| `([\w-]+)` \| .+ \|$", table, re.MULTILINE)
+    described = find_lines(r"^\| `([\w-]+)` \| .+ \|$", table)
     assert sorted(described) == sorted(["engine", *WORK, *FORWARD])
     names = {engine.name for engine in (*ENGINES, *load_further(), *HARD_ENGINES)}
     assert names | {FORMULAS} == set(WORK)
@@ -82,7 +80,7 @@ def test_every_engine_is_described():
 @mark.slow
 def test_every_quantity_of_a_scene_is_described(results):
     table = PAGE.partition("## Quantities of a scene")[2].partition("## Queries")[0]
-    described = re.findall(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table, re.MULTILINE)
+    described = find_lines(r"^\| `([\w ]+)` \| [^|]+ \| .+ \|$", table)
     of_positions = {q.name for q in QUANTITIES}
     rows = [
         row

@@ -36,7 +36,7 @@ from fourbar_validation.cost.cost import cost, list_front
 from fourbar_validation.cost.series import BEST, Spot
 from fourbar_validation.engines.mujoco.trial import TrialSetup
 from fourbar_validation.scenes.suites import MODELS
-from tests.support.checkout import read
+from tests.support.checkout import find_lines, read
 from tests.support.costs import point
 from tests.support.rows import slow_but
 from tests.support.scenes import (
@@ -345,7 +345,7 @@ def test_cost_measures_what_advise_measures(drive, tmp_path, monkeypatch):
 @mark.parametrize("drive, column", [(2, 1), (4, 3)])
 def test_the_page_tells_what_a_curve_through_samples_misses(drive, column):
     page = read("docs/cost.md")
-    rows = re.findall(r"^\| (120|360|720) \|(.*)\|$", page, re.MULTILINE)
+    rows = find_lines(r"^\| (120|360|720) \|(.*)\|$", page)
     assert len(rows) == 3
     scene = replace(fourbar.load(MODELS / "crank_rocker.toml"), drive_bar=drive)
     for count, cells in rows:

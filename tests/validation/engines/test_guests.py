@@ -48,6 +48,9 @@ STROKE = crank_rocker(
 )
 
 
+in_a_host = mark.usefixtures("hosted")
+
+
 def place_of(text):
     """The file and the line of the hostile class that has a text."""
     lines = FILE.read_text("utf-8").splitlines()
@@ -319,7 +322,7 @@ def test_a_class_has_a_process_of_its_own():
     assert by_engine["right"].keys() >= {*fourbar.quantities.UNKNOWNS, *derived}
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 def test_what_a_class_answers_or_raises_is_said_in_a_line():
     names = "Angle Prints Empty Leaves Lacks Shapes Elsewhere Complex"
     by_engine = judged(SCENE, *names.split())
@@ -342,7 +345,7 @@ def test_what_a_class_answers_or_raises_is_said_in_a_line():
     }
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 @mark.parametrize("scene", [ROCKING, STROKE], ids=["bar 4", "stroke"])
 def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
     by_engine = judged(scene, "OfAnyBar", "Right")
@@ -352,7 +355,7 @@ def test_a_guest_is_asked_for_the_commands_that_its_hello_names(scene):
     assert by_engine["right"]["all"][0] == REFUSES
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 def test_a_guest_is_not_asked_for_what_its_hello_leaves_out(tmp_path):
     motion = Motion(theta_3=Sweep(0.4, 0.8, 8), omega_3=3.0)
     assert judged(crank_rocker(motion), "OfAnyBar")["of any bar"]["all"][0] == REFUSES
@@ -383,7 +386,7 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
 
 
 @mark.slow
-@mark.usefixtures("hosted")
+@in_a_host
 def test_a_guest_that_integrates_is_asked_for_released_motions(monkeypatch):
     importorskip("mujoco")
     longest = "fourbar_validation.run.released.LONGEST_OF_A_GUEST"
@@ -425,7 +428,7 @@ def test_a_version_stands_in_a_name_only_beside_another_one(stated, names, monke
     assert ", ".join(guest.start().name for guest in named) == names
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 def test_names_stand_apart():
     """Of another engine, of two guests, and of those whose hello fails.
 
@@ -452,7 +455,7 @@ def test_what_is_not_there_is_refused_in_one_line(entry, part):
         select_engines(Request(guest=(entry,)))
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 @mark.parametrize(
     "name, reason",
     read_rows("""
@@ -535,7 +538,7 @@ SAME = ("setting", "assembled", "refusal", "alarms", "evidence", "quantities")
 SAME += ("predicted",)
 
 
-@mark.usefixtures("hosted")
+@in_a_host
 @mark.parametrize(
     "engine",
     [
