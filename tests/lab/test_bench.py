@@ -3,9 +3,8 @@
 Each is of a row that is measured, is reported with its reason, and costs the run.
 """
 
-import math
 from functools import partial
-from math import nan, pi
+from math import inf, nan, pi
 
 import numpy as np
 from click.testing import CliRunner
@@ -34,7 +33,7 @@ def test_every_limit_is_of_a_row_that_is_measured(tmp_path, monkeypatch):
         *measured.over_positions.values(),
         *measured.over_linkages.values(),
     ]
-    assert all(0.0 < value < math.inf for row in numbers for value in row.values())
+    assert all(0.0 < value < inf for row in numbers for value in row.values())
     assert set(measured.over_positions["NumPy"]) == {1000, 10_000}
     assert set(measured.over_linkages["study, NumPy"]) == {1, 10, 100, 1000}
     assert set(measured.over_linkages["one after the other"]) == {1, 10}

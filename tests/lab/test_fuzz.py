@@ -10,7 +10,7 @@ from unittest.mock import Mock
 import numpy as np
 from pytest import mark
 
-import fourbar
+from fourbar import Motion, Scene, uniform
 from fourbar.files import loads
 from fourbar_lab import fuzz as examine
 from fourbar_lab.fuzz import (
@@ -53,9 +53,7 @@ def test_an_error_of_a_billionth_is_found_and_shrunk(monkeypatch, tmp_path):
         return true(lengths, angles, drive_bar, wrenches, *others)
 
     monkeypatch.setattr(solving, "pin_forces", wrong)
-    scene = replace(
-        crank_rocker(), motion=fourbar.Motion(np.array([1.0, 2.0]), 10.0, 5.0)
-    )
+    scene = replace(crank_rocker(), motion=Motion(np.array([1.0, 2.0]), 10.0, 5.0))
     assert examine.list_findings(scene)
     small = shrink_scene(scene, examine.list_findings)
     assert len(small.loads) + len(small.effects) < 3 and examine.list_findings(small)
@@ -73,9 +71,7 @@ def test_a_traceback_is_a_finding_and_so_is_a_file_of_another_scene(monkeypatch)
 
 
 def test_a_position_that_does_not_close_is_a_finding(monkeypatch):
-    scene = fourbar.Scene(
-        fourbar.uniform(0.3, 0.25, 0.1, 0.22), fourbar.Motion([3.0], 1.0)
-    )
+    scene = Scene(uniform(0.3, 0.25, 0.1, 0.22), Motion([3.0], 1.0))
 
     def pretend(solution):
         solution.status_code[:] = 0

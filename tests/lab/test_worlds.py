@@ -3,7 +3,7 @@
 MJX and MuJoCo Warp need not be there. Where they are, they run on any device.
 """
 
-import math
+from math import tau
 
 import numpy as np
 from pytest import importorskip, mark, raises
@@ -45,8 +45,8 @@ def test_the_last_worlds_are_judged_and_every_world_has_a_state():
     assert cost.first > 0.5 * cost.seconds and cost.exchanged > 0.5 * cost.seconds
     scene, command = ask_position()
     q, v, *_ = MujocoFile().in_worlds(scene, TWO_TURNS).exchange()
-    turned = np.remainder(q[:, 0] - np.resize(command.theta_2, TWO_TURNS), math.tau)
-    assert np.minimum(turned, math.tau - turned).max() < 1e-12
+    turned = np.remainder(q[:, 0] - np.resize(command.theta_2, TWO_TURNS), tau)
+    assert np.minimum(turned, tau - turned).max() < 1e-12
     assert len(v) == TWO_TURNS
 
 

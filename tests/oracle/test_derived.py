@@ -8,8 +8,17 @@ from dataclasses import replace
 import numpy as np
 from pytest import mark
 
-import fourbar
-from fourbar import Bar, Flywheel, FourBar, Gravity, Load, Motion, Springs, Sweep
+from fourbar import (
+    Bar,
+    Flywheel,
+    FourBar,
+    Gravity,
+    Load,
+    Motion,
+    Spring,
+    Springs,
+    Sweep,
+)
 from fourbar.effects import Place
 from fourbar.files import loads
 from fourbar.scene import Scene, command
@@ -66,9 +75,7 @@ force = ["900 N", "-80 deg"]
 "pins.O4.1" = "0.1 mm"
 "points.edge.drawn.0" = ["0.2 mm", "sigma"]
 """
-NEARLY_MEET = fourbar.Spring(
-    Place(1, (0.05, 0.0)), Place(2, (0.05005, 0.0)), 2e4, 0.1, 3e3
-)
+NEARLY_MEET = Spring(Place(1, (0.05, 0.0)), Place(2, (0.05005, 0.0)), 2e4, 0.1, 3e3)
 """Its ends come within 0.05 mm of each other: there its line turns by half a turn
 within 1 mrad of the input.
 """

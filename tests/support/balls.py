@@ -3,8 +3,7 @@
 import numpy as np
 from flint import arb, ctx
 
-import fourbar
-from fourbar import Motion, Scene
+from fourbar import Motion, Scene, command
 from fourbar.scene import with_signs
 from fourbar_validation.engines.balls import (
     compute_directions,
@@ -19,7 +18,7 @@ def answer_in_balls(scene):
 
     (n,), vectors (n, 2), NaN where it has no value.
     """
-    at = with_signs(scene.linkage, fourbar.command(scene))
+    at = with_signs(scene.linkage, command(scene))
     rows = []
     with ctx.workprec(ctx.prec):
         places = at.stated[0]

@@ -4,8 +4,8 @@ Each holds at one value of what it limits, not at another. An engine upgrade tha
 a limit, or makes it worse, is then noticed.
 """
 
-import math
 from dataclasses import replace
+from math import acos, sqrt
 from typing import NamedTuple
 
 import mujoco
@@ -50,9 +50,9 @@ def _near_toggle(sine):
     |sin mu| has this value at its end.
     """
     d, a, b, c = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, 1)
-    cosine = -math.sqrt(1.0 - sine * sine)
+    cosine = -sqrt(1.0 - sine * sine)
     squared = b * b + c * c - 2.0 * b * c * cosine
-    psi = math.acos((d * d + a * a - squared) / (2.0 * d * a))
+    psi = acos((d * d + a * a - squared) / (2.0 * d * a))
     return not _simulated(
         set_angles(dress((d, a, b, c), 1), np.linspace(psi - 0.5, psi, 20))
     ).alarms
@@ -66,9 +66,7 @@ def _at_speed(omega_2):
 
 
 def _crank_acceleration(value):
-    answer = _simulated(
-        replace(_at_speed(math.sqrt(value / 0.1)), loads=(), effects=())
-    )
+    answer = _simulated(replace(_at_speed(sqrt(value / 0.1)), loads=(), effects=()))
     return not answer.alarms and answer.evidence["force_gap"] < 1e-3
 
 

@@ -3,11 +3,11 @@
 Read from the page, registered, and judged by the engines.
 """
 
-import math
 import re
 import shutil
 import sys
 import textwrap
+from math import radians
 
 from pytest import fixture, mark, raises
 
@@ -77,7 +77,7 @@ def guide_scene():
 
 def test_the_example_is_read_written_and_agreed_on(latch):
     scene = guide_scene()
-    assert scene.effects == (latch(4, 0.2, math.radians(115.0), math.radians(5.0)),)
+    assert scene.effects == (latch(4, 0.2, radians(115.0), radians(5.0)),)
     assert loads(dump(scene)) == scene
     assert latch.example in block("toml")
 

@@ -17,12 +17,13 @@ from pathlib import Path
 import numpy as np
 from pytest import approx, mark, raises
 
-import fourbar
 from fourbar import (
+    Free,
     LinearDrive,
     Motion,
     Place,
     Sweep,
+    __version__,
     cli,
     load,
     mjcf,
@@ -111,7 +112,7 @@ def test_one_position_is_an_array_and_has_no_forces_without_a_speed(show):
 
 @mark.slow
 def test_a_free_motion_has_time_and_no_drive(show):
-    save(crank_rocker(Motion(0.5, 0.0, free=fourbar.Free(0.5, 4))), "scene.toml")
+    save(crank_rocker(Motion(0.5, 0.0, free=Free(0.5, 4))), "scene.toml")
     document = strict(show("analyze", "scene.toml", "--json"))
     assert document["time"] == [0.0, 0.125, 0.25, 0.375, 0.5]
 
@@ -239,7 +240,7 @@ def test_no_command_is_a_question_for_help(show, capsys):
         line = f"{command.name} {command.get_short_help_str(limit=1000)}"
         assert " ".join(line.split()) in described
     assert max(map(len, out.splitlines())) <= 80
-    assert show("-V") == f"fourbar, version {fourbar.__version__}\n"
+    assert show("-V") == f"fourbar, version {__version__}\n"
     harness = import_module("fourbar_validation.cli").status([])
     assert harness == HOLDS and "advise" in capsys.readouterr().out
 

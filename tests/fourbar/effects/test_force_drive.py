@@ -3,10 +3,9 @@
 Against free bodies in balls, limiting cases, symmetry, power, and what is refused.
 """
 
-import math
 from dataclasses import replace
 from itertools import combinations
-from math import pi
+from math import pi, radians
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -138,7 +137,7 @@ def test_it_reads_back_as_it_was_written_and_is_carried_by_studies():
     again = loads(dump(scene))
     assert again.drive == scene.drive
     assert again.drive.start.bar == 1 and again.drive.end == Place(4, (0.09, 0.0))
-    assert again.drive.start.from_pin == approx((0.21, math.radians(-60)))
+    assert again.drive.start.from_pin == approx((0.21, radians(-60)))
     assert again.drive_bar is None
     assert '"drive_bar": null' in write_json(solve(again))
     with raises(

@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 
 from pytest import approx, mark, raises
 
-import fourbar
-from fourbar import Gravity, Motion, Torsion, Viscous, solve
+from fourbar import Free, Gravity, Load, Motion, Torsion, Viscous, solve
 from fourbar.errors import LimitError
 from fourbar.mjcf import write_mjcf_for
 from fourbar.mjcf.assembly import write_sdf, write_usd
@@ -25,7 +24,7 @@ def test_a_file_for_genesis_says_what_it_leaves_out():
 
 def released(**changes):
     """A linkage let go under its weight, with a damper."""
-    motion = Motion(1.0, 3.0, free=fourbar.Free(0.2, 2))
+    motion = Motion(1.0, 3.0, free=Free(0.2, 2))
     effects = (Gravity(), Viscous.at(O2=0.05))
     return crank_rocker(
         **({"motion": motion, "effects": effects, "loads": ()} | changes)
@@ -81,7 +80,7 @@ def test_an_sdf_stands_closed_at_B_and_its_joints_are_damped(reader):
     assert [one.text for one in root.iter("damping")] == ["0.05"]
 
 
-LOADED = crank_rocker(loads=(fourbar.Load(4, moment=1.0),))
+LOADED = crank_rocker(loads=(Load(4, moment=1.0),))
 AT_B = (Viscous.at(B=1.0),)
 
 

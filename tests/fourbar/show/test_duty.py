@@ -8,13 +8,14 @@ from math import copysign, radians, sin, tau
 import numpy as np
 from pytest import approx, mark, raises
 
-import fourbar
 from fourbar import (
     Bar,
     FourBar,
     Friction,
     Gravity,
+    InputError,
     Law,
+    Load,
     Motion,
     Place,
     Scene,
@@ -111,7 +112,7 @@ def test_the_energies_of_a_weight_on_the_crank_are_known_by_hand(start, stop, sp
     """
     linkage = FourBar(0.3, Bar(0.1, 2.0, 0.0, (0.1, 0.0)), Bar(0.25), Bar(0.22))
     motion = Motion(Sweep(start, stop, 720), speed)
-    couple = fourbar.Load(2, moment=-0.7)
+    couple = Load(2, moment=-0.7)
     duty = motor_duty(solve(Scene(linkage, motion, loads=(couple,), effects=WEIGHT)))
     turned = copysign(1.0, speed) * abs(stop - start)
     first, last = (start, stop) if turned * (stop - start) > 0.0 else (stop, start)
@@ -159,7 +160,7 @@ def test_a_list_has_peaks_and_means_of_its_positions_and_no_energies(stop):
 def test_a_study_has_shaking_and_its_members_a_duty():
     study = solve(vary(crank_rocker(), {"bars.input.mass": [0.2, 0.3]}))
     for ask in (motor_duty, lambda solution: bearing_load(solution, "A")):
-        with raises(fourbar.InputError, match="members of a study one by one"):
+        with raises(InputError, match="members of a study one by one"):
             ask(study)
 
 

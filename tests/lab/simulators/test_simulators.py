@@ -11,7 +11,7 @@ from math import remainder, tau
 import numpy as np
 from pytest import approx, fixture, importorskip, mark
 
-import fourbar
+from fourbar import load
 from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.assembly import write_sdf
 from fourbar.quantities import PIN_FORCES
@@ -91,7 +91,7 @@ def test_a_simulator_starts_from_its_own_assembly_without_the_formulas():
     for path in paths:
         formulas = r"fourbar(\.| import .*)(solving|formulas)"
         assert not re.search(formulas, path.read_text()), path
-    scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
+    scene = load(PROBLEMS / "crank_rocker.toml")
     for branch, first in ((1, tau), (-1, 0.0)):
         moved = recommand(scene, branch=branch, speed=-10.0 * branch)
         begin = protocol_engines.start(moved)
@@ -145,7 +145,7 @@ def test_derivatives_of_the_torque_are_compared_at_the_simulators_own_state():
 
     A differentiable simulator is given these changes.
     """
-    scene = fourbar.load(PROBLEMS / "crank_rocker.toml")
+    scene = load(PROBLEMS / "crank_rocker.toml")
     _, theta_2 = gradients.choose_quarter(scene)
 
     def answered(state):

@@ -12,7 +12,7 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import fourbar
-from fourbar import Bar, Friction, Load, Motion, Sweep, Torsion
+from fourbar import Bar, Friction, Load, Motion, Sweep, Torsion, save
 from fourbar.cli import status as fourbar_status
 from fourbar.effects.load import Table
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
@@ -108,7 +108,7 @@ def check(tmp_path, capsys):
         if text is not None:
             table.write_bytes(text if isinstance(text, bytes) else text.encode())
         if isinstance(scene, Scene):
-            fourbar.save(scene, tmp_path / "scene.toml")
+            save(scene, tmp_path / "scene.toml")
             scene = tmp_path / "scene.toml"
         code = status(["check", str(scene), str(table), *options])
         printed = capsys.readouterr()
@@ -1165,7 +1165,7 @@ def test_the_default_csv_returns_to_the_last_digit(
     if name == "unloaded":
         scene.write_text(UNLOADED)
     elif name == "saved":
-        fourbar.save(OURS, scene)
+        save(OURS, scene)
     else:
         scene = MODELS / f"{name}.toml"
     form = options.split() if "csv" in options else (*options.split(), "--csv")

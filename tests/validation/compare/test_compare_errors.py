@@ -3,9 +3,9 @@
 The comparison fails there and nowhere else.
 """
 
-import math
 from dataclasses import replace
 from functools import partial
+from math import nan, sin
 
 import numpy as np
 from pytest import approx, importorskip, mark
@@ -98,7 +98,7 @@ def test_what_is_allowed_is_fifty_last_digits_over_the_condition(factor):
     longest bar.
     """
     assert (K, EPS) == (50.0, 2.0**-52)
-    s = abs(math.sin(FORMULAS.theta_4[MIDDLE] - FORMULAS.theta_3[MIDDLE]))
+    s = abs(sin(FORMULAS.theta_4[MIDDLE] - FORMULAS.theta_3[MIDDLE]))
     allowed = 50.0 * 2.0**-52 / (s * 0.22 / 0.3)
     answer = make_answer(theta_3=moved("theta_3", MIDDLE, factor * allowed))
     row = compare(answer)["theta_3"]
@@ -112,12 +112,12 @@ def test_what_is_missing_or_no_number_where_the_loop_closes_fails(name):
     gone = compare(make_answer(**{name: None}))[name]
     assert gone.failed and gone.reason == "no answer"
     for place in (FIRST, LAST):
-        row = compare(make_answer(**{name: moved(name, place, math.nan)}))[name]
+        row = compare(make_answer(**{name: moved(name, place, nan)}))[name]
         assert row.failed and row.reason.startswith("NaN")
 
 
 def test_an_engine_that_closes_elsewhere_fails_either_way():
-    for torque in (FORMULAS.torque, moved("torque", FIRST, math.nan)):
+    for torque in (FORMULAS.torque, moved("torque", FIRST, nan)):
         rows = compare(make_answer(np.arange(POSITIONS) != FIRST, torque=torque))
         assert list_failing(rows) == {"assembled"}
     longer = crank_rocker(linkage=uniform(0.3, 0.25, 0.1, 0.22))

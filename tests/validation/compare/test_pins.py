@@ -4,23 +4,23 @@ conversion of them.
 
 import numpy as np
 
-import fourbar
+from fourbar import Load, Point, solve
 from fourbar.effects import Place
 from fourbar_validation.compare.scales import TermSizes
 from tests.support.scenes import crank_rocker
 
 LOADED = crank_rocker(
     loads=(
-        fourbar.Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
-        fourbar.Load(3, (2.0, -1.4), point="P"),
+        Load(4, (3.0, 0.7), from_centre=(0.05, 1.0)),
+        Load(3, (2.0, -1.4), point="P"),
     ),
-    points=(fourbar.Point("P", 3, from_centre=(0.04, -2.0)),),
+    points=(Point("P", 3, from_centre=(0.04, -2.0)),),
 )
 
 
 def test_a_place_that_the_formulas_misread_widens_nothing(monkeypatch):
     """With places from G far away, a torque would be allowed to be as far off."""
-    solution = fourbar.solve(LOADED)
+    solution = solve(LOADED)
 
     def sum_terms():
         names = ("F12", "torque")

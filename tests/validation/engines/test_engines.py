@@ -3,10 +3,10 @@
 Published figures, round-off agreement, the right branch, limits, faults that must show.
 """
 
-import math
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from itertools import combinations, product, starmap
+from math import isnan, pi
 from typing import ClassVar
 
 import numpy as np
@@ -410,7 +410,7 @@ def test_a_planted_fault_shows(name, monkeypatch):
 
 MOVED = {"A", "theta_3", "theta_4", "omega_2", "omega_3", "alpha_2", "alpha_4", "a_B"}
 MOVED |= {"F12", "F32", "F43", "F14", "closure"}
-LATER = 20.0 * math.pi
+LATER = 20.0 * pi
 COMMANDED = {
     "theta_3": (np.linspace(0.4, 0.8, 8) + LATER, 3.0, -2.0),
     "theta_4": (np.linspace(1.8, 2.5, 8) + LATER, 3.0, -2.0),
@@ -502,7 +502,7 @@ def test_near_a_jam_an_engine_finds_the_one_solution_that_there_is(
             answered(name, case).quantities["torque"][0]
             for name in ("pinocchio-inverse", "free-body")
         )
-        assert math.isnan(engine) is math.isnan(bodies) is jams
+        assert isnan(engine) is isnan(bodies) is jams
         # rounding leaves some 1e-12 near a jam
         assert jams or abs(engine - bodies) <= 1e-9 * abs(bodies)
 

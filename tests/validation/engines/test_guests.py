@@ -13,7 +13,7 @@ import numpy as np
 from pytest import fixture, importorskip, mark, param, raises, skip
 
 import fourbar
-from fourbar import Motion, Sweep
+from fourbar import Motion, Place, Sweep
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import asking, guests, programs, registry
@@ -369,7 +369,7 @@ def test_a_guest_of_protocol_3_is_not_asked_for_springs_that_act_one_way(acts):
     """Its hello names springs alone: those that act both ways it is asked as before."""
     hello = guests.Hello("sprung", effects=("springs",))
     client = guests.GuestClient("sprung", guests.Program(("none",)), hello)
-    ends = fourbar.Place(1, (0.1, 0.5)), fourbar.Place(2, (0.1, 0.0))
+    ends = Place(1, (0.1, 0.5)), Place(2, (0.1, 0.0))
     springs = fourbar.Springs(
         (
             fourbar.Spring(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fourbar
+from fourbar import PinFriction, Viscous, command, load
 from fourbar.errors import LimitError
 from fourbar_validation.advise.worst_errors import compute_errors
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
@@ -16,10 +16,10 @@ from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 
 SCENES = (
     *(crank_rocker(drive_bar=bar) for bar in (2, 3)),
-    crank_rocker(effects=(fourbar.Viscous.at(A=0.1),)),
+    crank_rocker(effects=(Viscous.at(A=0.1),)),
     low_parallelogram(),
     thesis(np.radians([100.0, 135.0])),
-    fourbar.load(MODELS / "crank_rocker.toml"),
+    load(MODELS / "crank_rocker.toml"),
 )
 
 
@@ -30,7 +30,7 @@ def test_it_answers_to_round_off(kind):
     Loads are placed from any origin.
     """
     for scene in SCENES:
-        rows = fourbar.command(scene)
+        rows = command(scene)
         assert (
             compute_errors(scene, rows, PlainLoop(kind, scene).answer(rows)).worst
             < 1e-11
@@ -38,8 +38,8 @@ def test_it_answers_to_round_off(kind):
 
 
 def test_friction_of_loaded_pins_and_cylinders_are_refused():
-    sliding = crank_rocker(effects=(fourbar.PinFriction.at(A=(0.2, 0.02)),))
-    cylinder = fourbar.load(MODELS / "capabilities" / "cylinder_2_4.toml")
+    sliding = crank_rocker(effects=(PinFriction.at(A=(0.2, 0.02)),))
+    cylinder = load(MODELS / "capabilities" / "cylinder_2_4.toml")
     for scene, words in (
         (sliding, "loads of pins"),
         (replace(cylinder, loads=()), "no cylinder"),

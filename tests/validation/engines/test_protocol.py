@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal, assert_equal
 from pytest import mark, raises
 
 import fourbar
+from fourbar import Motion, Place
 from fourbar.errors import InputError
 from fourbar.scene import StrokeOrigin
 from fourbar.scene import command as list_positions
@@ -54,7 +55,7 @@ def stated(scene):
     return replace(
         scene,
         linkage=replace(link, input=input_bar, coupler=coupler, output=output),
-        motion=fourbar.Motion(),
+        motion=Motion(),
         title="",
         source="",
         pictures=(),
@@ -132,7 +133,7 @@ def test_nothing_travels_that_the_formulas_computed():
 
 
 def test_a_gas_spring_travels_as_its_file_is_written_and_a_table_in_radians():
-    ends = fourbar.Place(1, (0.1, -1.0)), fourbar.Place(4, (0.05, 0.2))
+    ends = Place(1, (0.1, -1.0)), Place(4, (0.05, 0.2))
     gas = fourbar.Spring.gas(*ends, 0.4, 0.1, 100.0, 150.0)
     table = fourbar.Table((0.0, pi, 2 * pi), (1.0, 0.5, 1.0))
     couple = fourbar.Load(4, moment=1.0, from_centre=(0.1, 0.0), table=table)
@@ -193,7 +194,7 @@ def test_an_answer_comes_back_with_all_that_it_says():
         assert_equal(getattr(back, name), value)
 
 
-THREE = crank_rocker(fourbar.Motion(np.array([0.0, 1.0, 2.0]), 1.0))
+THREE = crank_rocker(Motion(np.array([0.0, 1.0, 2.0]), 1.0))
 
 
 def read_answer(data):

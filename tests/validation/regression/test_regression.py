@@ -17,7 +17,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 from pytest import fixture, mark, raises
 
-import fourbar
+from fourbar import Motion, Sweep, dump, load
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import ResultsWriter
@@ -60,7 +60,7 @@ from tests.support.scenes import relink
 
 TIMES = "scene,engine,-,1,1,3.0\n"
 MODEL = MODELS / "crank_rocker.toml"
-SCENE = fourbar.load(MODEL)
+SCENE = load(MODEL)
 
 
 @fixture
@@ -410,7 +410,7 @@ def weighted(inertia, **changes):
 
 
 OTHER, WRONG = changed(scene="other"), changed(error=1e-9, allowed=1e-8)
-FINER = SCENE.motion.replace(angle=fourbar.Sweep(0.0, 2.0 * math.pi, 720))
+FINER = SCENE.motion.replace(angle=Sweep(0.0, 2.0 * math.pi, 720))
 QUESTIONS = [
     (
         {"scene": weighted(0.05, title="another title")},
@@ -725,8 +725,8 @@ def test_a_name_that_does_not_print_or_is_a_formula_is_one_name_everywhere(
     """
     judge_here(monkeypatch)
     names = ["a\x1b", "aB", "=cmd|'calc'!A0", "+1", "'quoted"]
-    motion = fourbar.Motion(fourbar.Sweep(0.1, 1.0, 3), 1.0)
-    text = fourbar.dump(replace(SCENE, motion=motion))
+    motion = Motion(Sweep(0.1, 1.0, 3), 1.0)
+    text = dump(replace(SCENE, motion=motion))
     files = [tmp_path / f"{name}.toml" for name in (*names, "a\\x1b")]
     for file in files:
         file.write_text(text)

@@ -19,8 +19,7 @@ from math import isnan, nan, radians
 import numpy as np
 from pytest import approx, fixture, mark
 
-import fourbar
-from fourbar import Free, Motion, Sweep
+from fourbar import Free, Motion, Sweep, solve
 from fourbar.quantities import PIN_FORCES
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import NO_POSITION, NO_VALUE
@@ -61,7 +60,7 @@ COMMENT_LIMIT = 65_536
 
 
 SCENE = crank_rocker(Motion(Sweep(0.0, 6.0, 36), 5.0))
-SOLUTION = fourbar.solve(SCENE, "force")
+SOLUTION = solve(SCENE, "force")
 
 
 @cache
