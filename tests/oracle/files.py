@@ -3,8 +3,8 @@
 The free bodies assemble them.
 """
 
-import cmath
 import re
+from cmath import phase, polar, rect
 from dataclasses import replace
 from math import atan2, nan
 from typing import NamedTuple
@@ -102,13 +102,13 @@ def _build_scene(held, scene):
     moving = []
     for name, bar in zip(MOVING_BAR_NUMBERS, bars, strict=True):
         _, _, mass, inertia, centre = held.bodies[name]
-        moving.append(Bar(abs(bar), mass, inertia, cmath.polar(centre)))
-    effects = (Gravity(*cmath.polar(held.gravity)),)
+        moving.append(Bar(abs(bar), mass, inertia, polar(centre)))
+    effects = (Gravity(*polar(held.gravity)),)
     if held.damping:
         effects += (Viscous.at(**held.damping),)
     if held.friction:
         effects += (Friction.at(**held.friction),)
-    linkage = FourBar(abs(span), *moving, cmath.phase(span))
+    linkage = FourBar(abs(span), *moving, phase(span))
     return replace(scene, linkage=linkage, effects=effects)
 
 
@@ -133,7 +133,7 @@ def _read_sdf(text):
         pin = joint.get("name", "")
         child = bodies[joint.findtext("child", "")]
         pose = complex(*numbers(joint, "pose", "0 0")[:2])
-        pins[pin] = child.place + pose * cmath.rect(1.0, child.turn)
+        pins[pin] = child.place + pose * rect(1.0, child.turn)
         for name, at_pins in dynamics.items():
             if (stated := joint.findtext(f"axis/dynamics/{name}")) is not None:
                 at_pins[pin] = float(stated)
@@ -183,7 +183,7 @@ def _read_usd(text):
         one, second = (
             bodies[bar].place
             + complex(*numbers(block, f"physics:localPos{end}")[:2])
-            * cmath.rect(1.0, bodies[bar].turn)
+            * rect(1.0, bodies[bar].turn)
             for end, bar in enumerate(names)
         )
         pins[pin] = one if abs(one - second) <= K * EPS * size else complex(nan)

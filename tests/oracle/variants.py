@@ -2,8 +2,8 @@
 results.
 """
 
-import cmath
 import tomllib
+from cmath import phase, rect
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
@@ -148,7 +148,7 @@ class SceneFile:
         drawn = is_coordinate(key)
         if ".drawn." in key:
             (holder, last), bar, axis = self._find_place(self._by_pins, key)
-            turned = cmath.rect(*map(_read, holder[last])) * self._along[bar]
+            turned = rect(*map(_read, holder[last])) * self._along[bar]
             place = self._feet[bar] + turned
             return (place.real, place.imag)[axis], min(map(abs, self._bars.values()))
         table, last = find_entry(self._by_pins if drawn else self._by_lengths, key)
@@ -182,9 +182,9 @@ class SceneFile:
         for key, change in changes.items():
             if ".drawn." in key:  # moved where the bars are drawn
                 (table, last), bar, axis = self._find_place(document, key)
-                place = cmath.rect(*map(_read, table[last]))
+                place = rect(*map(_read, table[last]))
                 place += change * _ALONG_AXES[axis] / self._along[bar]
-                table[last] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
+                table[last] = [f"{abs(place)!r} m", f"{phase(place)!r} rad"]
                 continue
             table, last = find_entry(document, key)
             table[last] = _change_entry(table[last], change)
@@ -202,10 +202,10 @@ class SceneFile:
             self._keep_on_ground(part, pins)
         if document.get("bar") == 1 and "from_pin" in document:
             O2, O4 = (complex(*map(_read, pins[pin])) for pin in ENDS[1])
-            place = cmath.rect(*map(_read, document["from_pin"]))
+            place = rect(*map(_read, document["from_pin"]))
             place = place * self._along[1] + self._feet[1] - O2
             place *= abs(O4 - O2) / (O4 - O2)
-            document["from_pin"] = [f"{abs(place)!r} m", f"{cmath.phase(place)!r} rad"]
+            document["from_pin"] = [f"{abs(place)!r} m", f"{phase(place)!r} rad"]
 
 
 def _read(quantity):

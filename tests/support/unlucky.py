@@ -5,9 +5,9 @@ A worker that imports them imports no more than it needs to judge.
 
 import os
 import signal
-import time
 from dataclasses import dataclass
 from pathlib import Path
+from time import sleep
 
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.scenes.suites import Suite
@@ -61,7 +61,7 @@ class Moody(Declines):
         if scene.title == "b":
             os.kill(os.getpid(), signal.SIGSEGV)
         if scene.title == "c":
-            time.sleep(3600.0)
+            sleep(3600.0)
 
 
 def dies_at_first(*_):
@@ -74,8 +74,8 @@ def dies_at_first(*_):
 
 def start_and_sleep(starts):
     """Work for some looks of the pool, before and after telling of it in a file."""
-    time.sleep(1.0)
+    sleep(1.0)
     with starts.open("a") as file:
         file.write("begun\n")
-    time.sleep(1.0)
+    sleep(1.0)
     return "done"

@@ -13,9 +13,9 @@ import struct
 import subprocess
 import sys
 import threading
-import time
 import warnings
 from pathlib import Path
+from time import monotonic, sleep
 
 from pytest import fixture, importorskip, mark, raises
 
@@ -60,9 +60,9 @@ def start(path, *options, **environment):
 
 
 def wait_until(happened):
-    deadline = time.monotonic() + 20
-    while not happened() and time.monotonic() < deadline:
-        time.sleep(0.05)
+    deadline = monotonic() + 20
+    while not happened() and monotonic() < deadline:
+        sleep(0.05)
 
 
 @fixture
@@ -493,7 +493,7 @@ def test_an_empty_page_and_one_of_a_killed_server_are_written_over(tmp_path, lef
 @mark.slow
 @mark.posix
 def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path):
-    began = time.monotonic()
+    began = monotonic()
     with start(path, "--no-browser") as process:
         address = process.stdout.readline()
         assert address.startswith("http://127.0.0.1:")
@@ -503,4 +503,4 @@ def test_the_command_prints_the_address_alone_and_ends_by_an_interrupt(path):
         process.send_signal(2)
         out, error = process.communicate(timeout=20)
     assert (process.returncode, out, error) == (0, "", "")
-    assert list(path.parent.iterdir()) == [path] and time.monotonic() - began < 60
+    assert list(path.parent.iterdir()) == [path] and monotonic() - began < 60

@@ -4,8 +4,8 @@ From an empty scene to a saved file, numbers equal to `analyze`'s.
 """
 
 import json
-import time
 from math import cos, degrees, hypot, remainder, sin
+from time import monotonic, sleep
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -67,10 +67,10 @@ class Page:
         return self.run(f"return {expression}", *arguments)
 
     def wait(self, expression):
-        deadline = time.monotonic() + WAIT
+        deadline = monotonic() + WAIT
         while not (value := self.value(expression)):
-            assert time.monotonic() < deadline, f"{expression} stays {value!r}"
-            time.sleep(0.02)
+            assert monotonic() < deadline, f"{expression} stays {value!r}"
+            sleep(0.02)
         return value
 
     def get(self, path):
@@ -433,7 +433,7 @@ def test_a_page_finds_its_server_again_and_a_new_one_goes_on_from_the_state(page
     page.wait_for_text("bench", "The server has stopped")
     again = page.serve(path, server.split("/")[2].partition(":")[2])
     assert again != server  # the token is another one, and the old page is told nothing
-    time.sleep(2.0)
+    sleep(2.0)
     assert page.value("line.readyState") != 1
     page.driver.get(again)
     page.wait("offers && data.lengths[1] === 0.11")

@@ -1,16 +1,16 @@
 """Steps that change a scene: its text, its history, its answers and its files."""
 
 import base64
-import cmath
 import gc
 import json
 import math
 import os
 import re
 import struct
-import time
 import tomllib
+from cmath import rect
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 from numpy.testing import assert_array_equal
@@ -299,9 +299,9 @@ def on_bar(s, bar, vector):
     if bar == 3:
         return complex(*s.A[0]) + vector * cis(s.theta_3[0])
     if bar == 4:
-        O4 = cmath.rect(linkage.ground, linkage.ground_angle)
+        O4 = rect(linkage.ground, linkage.ground_angle)
         return O4 + vector * cis(s.theta_4[0])
-    return vector * cmath.exp(1j * linkage.ground_angle)
+    return vector * cis(linkage.ground_angle)
 
 
 LOADED = """
@@ -356,13 +356,12 @@ DRAGGED = {
         lambda s: on_bar(
             s,
             3,
-            s.scene.linkage.coupler.to_centre
-            + cmath.rect(*s.scene.loads[1].from_centre),
+            s.scene.linkage.coupler.to_centre + rect(*s.scene.loads[1].from_centre),
         ),
     ),
     "arm in world axes": (
         ["loads", 4, "arm"],
-        lambda s: complex(*s.G3[0]) + cmath.rect(*s.scene.loads[4].arm),
+        lambda s: complex(*s.G3[0]) + rect(*s.scene.loads[4].arm),
     ),
     "by coordinates": (
         ["loads", 3, "from_pin"],
@@ -389,7 +388,7 @@ def test_a_ground_by_coordinates_is_dragged_by_them(session):
     session.change(lambda document: document.put(["lengths", "ground"], stated))
     to = 0.33 + 0.05j
     linkage = drag(session, "O4", to).scene.linkage
-    assert cmath.rect(linkage.ground, linkage.ground_angle) == approx(to, abs=PIXEL)
+    assert rect(linkage.ground, linkage.ground_angle) == approx(to, abs=PIXEL)
     ground = session.now.plain["lengths"]["ground"]
     assert [ground[axis].split()[-1] for axis in "xy"] == ["in", "mm"]
     assert "ground_angle" not in session.now.plain["lengths"]
@@ -582,15 +581,15 @@ def test_an_answer_takes_ten_bare_solves_at_most(session):
     gc.collect()
     gc.freeze()
     for turn in range(20):
-        start = time.process_time()
+        start = process_time()
         for _ in range(BARE_A_READING):
             solve(session.now.scene)
-        middle = time.process_time()
+        middle = process_time()
         for number in range(ANSWERS_A_READING):
             length = f"{100 + (turn + number) % 9} mm"
             pack_frame(session.do(set_to("lengths/input", length, gesture="g")))
         bare.append((middle - start) / BARE_A_READING)
-        answer.append((time.process_time() - middle) / ANSWERS_A_READING)
+        answer.append((process_time() - middle) / ANSWERS_A_READING)
     assert min(answer) < BARE_SOLVES * min(bare), (answer, bare)
 
 

@@ -1,7 +1,7 @@
 """An effect of one file is read, written, varied, drawn and dragged by its fields."""
 
-import cmath
 import sys
+from cmath import rect
 from dataclasses import replace
 
 from pytest import approx, fixture, mark
@@ -174,7 +174,7 @@ def test_its_places_are_handles_and_symbols(scene):
     }
     coil = handles["coil of magnets"]
     assert coil.path == ("effects", "magnets", "coil", "from_pin")
-    assert (coil.bar, coil.beyond) == (3, cmath.rect(0.05, 0.5))
+    assert (coil.bar, coil.beyond) == (3, rect(0.05, 0.5))
     point = handles["from of magnets rows 1"]
     assert (point.path, point.bar) == (("points", "P", "from_pin"), 4)
     far = handles["to of magnets rows 2"].path
@@ -186,5 +186,5 @@ def test_its_places_are_handles_and_symbols(scene):
         ("spring", "magnet", ""),
         ("spring", "magnet", ""),
     ]
-    assert (acting[1].bar, acting[1].at) == (3, cmath.rect(0.05, 0.5))
+    assert (acting[1].bar, acting[1].at) == (3, rect(0.05, 0.5))
     assert acting[2].end == (1, 0.0)

@@ -2,9 +2,9 @@
 
 import base64
 import re
-import time
 from dataclasses import replace
 from math import atan2, cos, degrees, pi, remainder, sin
+from time import monotonic, sleep
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -173,9 +173,9 @@ def test_play_moves_the_linkage_and_pause_leaves_true_numbers(turning):
     start = page.pins()["A"]
     page["play"].click()
     assert page["play"].text == "Pause"
-    deadline = time.monotonic() + 10.0
+    deadline = monotonic() + 10.0
     while page.state("row") < 4:
-        assert time.monotonic() < deadline, "the linkage does not move"
+        assert monotonic() < deadline, "the linkage does not move"
     page["play"].click()
     assert np.hypot(*(page.pins()["A"] - start)) > 10
     page.require(s, page.state("row"), "torque", "omega_4")
@@ -275,10 +275,10 @@ def test_what_is_downloaded_is_the_scene_on_the_branch_shown(show, tmp_path):
     folder = {"behavior": "allow", "downloadPath": str(tmp_path)}
     page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
     page["download"].click()
-    until = time.monotonic() + 10.0
+    until = monotonic() + 10.0
     file = tmp_path / "linkage.toml"  # made empty at first
-    while not (file.exists() and file.stat().st_size) and time.monotonic() < until:
-        time.sleep(0.02)
+    while not (file.exists() and file.stat().st_size) and monotonic() < until:
+        sleep(0.02)
     saved = loads(file.read_text())
     assert (saved.linkage, saved.loads) == (scene.linkage, scene.loads)
     assert (saved.title, saved.motion.branch) == ("a\\nb", -1)

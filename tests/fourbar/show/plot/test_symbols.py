@@ -3,7 +3,7 @@
 A symbol for everything a scene file can name, where and in the direction it acts.
 """
 
-import cmath
+from cmath import phase, rect
 from dataclasses import replace
 from math import copysign, cos, pi, sin, tau
 
@@ -73,17 +73,17 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     G3, G4 = (complex(*solution[name][index]) for name in ("G3", "G4"))
     sign = copysign(1.0, TABLED.table.at(solution.theta_2[index]))
     for name, tail, direction in (
-        ("load 1", G3 + cmath.rect(0.03, 1.0 + theta_3), cmath.rect(1, 0.5 + theta_3)),
-        ("load 2", G4, cmath.rect(sign, 0.2)),
+        ("load 1", G3 + rect(0.03, 1.0 + theta_3), rect(1, 0.5 + theta_3)),
+        ("load 2", G4, rect(sign, 0.2)),
     ):
         start, tip = ends(name)
         assert abs(start - tail) < 1e-15
-        assert abs(cmath.phase((tip - start) / direction)) < 1e-12
+        assert abs(phase((tip - start) / direction)) < 1e-12
     start, stop = ends("spring")
     theta_1 = everything.linkage.ground_angle
-    O4 = cmath.rect(everything.linkage.ground, theta_1)
-    assert abs(start - cmath.rect(0.1, theta_1 - 0.5 * pi)) < 1e-15
-    assert abs(stop - O4 - cmath.rect(0.08, theta_4)) < 1e-15
+    O4 = rect(everything.linkage.ground, theta_1)
+    assert abs(start - rect(0.1, theta_1 - 0.5 * pi)) < 1e-15
+    assert abs(stop - O4 - rect(0.08, theta_4)) < 1e-15
 
 
 @mark.parametrize("moment", [2.0, -2.0])
@@ -167,4 +167,4 @@ def test_the_points_of_a_scene_are_drawn_where_they_are():
     assert sum(abs(foot - at) < 1e-9 for foot in feet) == 2
     (point,) = animate.collect_page_data(scene, {})["points"]
     assert point["name"] == "P"
-    assert abs(complex(*point["at"]) - cmath.rect(0.15, 0.7)) < 1e-15
+    assert abs(complex(*point["at"]) - rect(0.15, 0.7)) < 1e-15
