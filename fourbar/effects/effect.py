@@ -348,6 +348,10 @@ class Effect(Placed):
         """
         return 0.0
 
+    def list_wound(self, state: State, branch: Number) -> dict[str, Number]:
+        """List where each pin is wound too far for the effect to have a value, (n,)."""
+        return {}
+
     def unwind(self, linkage: FourBar, q: Joints) -> Joints:
         """Move the angles of pins O2, A, O4 by the whole turns that count, rad."""
         return q

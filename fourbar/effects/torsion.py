@@ -84,12 +84,18 @@ class Torsion(PinRows):
         """Return WOUND at half a turn from rest and beyond."""
         if self.turns is None or branch is None:
             return None
-        wound = np.zeros(np.shape(state.theta_2), dtype=bool)
+        wound = np.any([*self.list_wound(state, branch).values()], axis=0)
+        return np.where(wound, WOUND, OK).astype(np.uint8)
+
+    def list_wound(self, state: State, branch: Number) -> dict[str, Number]:
+        """List where each sprung pin is at half a turn from rest and beyond."""
+        assert self.turns is not None
         angles = self._follow_angles(state, branch)
         rows = zip(angles, self.turns, self.springs, strict=True)
-        for followed, turns, (_, _, rest, _) in rows:
-            wound |= np.abs(followed - rest - turns) > HALF_TURN
-        return np.where(wound, WOUND, OK).astype(np.uint8)
+        return {
+            pin: np.abs(followed - rest - turns) > HALF_TURN
+            for followed, turns, (pin, _, rest, _) in rows
+        }
 
     def add_to_mjcf(self, model: Any) -> None:
         """Write the ``stiffness`` of the hinge, or of a tendon at the cut pin B.

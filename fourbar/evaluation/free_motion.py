@@ -534,11 +534,13 @@ class _Run:
             begun = Case.of(self.scene).begin_with(motion.part(slice(0, 1)))
             state = begun.at(motion)
             for term in begun.terms:
-                codes = term.status(state, motion.branch) if term.counts_turns else None
-                if codes is not None and codes.any():
-                    assert motion.time is not None
-                    raise LimitError(
-                        f"effects.{term.key}: at {motion.time[np.argmax(codes)]:.6g}"
-                        " s the free motion has turned a pin by more than half a turn"
-                        " from the rest of its spring, which is not modelled"
-                    )
+                for pin, rows in term.list_wound(state, motion.branch).items():
+                    if rows.any():
+                        assert motion.time is not None
+                        raise LimitError(
+                            f"effects.{term.key}.{pin}: at"
+                            f" {motion.time[np.argmax(rows)]:.6g} s the free motion has"
+                            f" turned {pin} by more than half a turn from the rest of"
+                            " its spring, which is not modelled: state a shorter"
+                            " motion.free.duration"
+                        )

@@ -235,7 +235,7 @@ def test_change_points_of_several_turns_are_noted_when_they_are_passed():
 def test_a_released_spring_is_followed_up_to_half_a_turn_and_no_further():
     spring = Torsion.at(O2=(0.01, 0.5, 0.0))
     assert len(release(let_go(0.5, 1.0, 0.2, 4, DOWN, spring)).command.time) == 5
-    wound = r"effects\.torsion: at 0.*more than half a turn"
+    wound = r"effects\.torsion\.O2: at 0.*turned O2 by more than half a turn.*duration"
     with raises(LimitError, match=wound):
         release(let_go(0.5, 40.0, 0.2, 40, DOWN, spring))
 

@@ -5,15 +5,16 @@ Judged to its end, whatever an engine does there.
 
 from dataclasses import replace
 from functools import partial
+from math import tau
 
 import numpy as np
 from pytest import mark
 
-from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion
+from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, Table
 from fourbar.scene import Scene
 from fourbar.solving import solve
 from fourbar_validation.compare.answer import ReleasedAnswer
-from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, UNDECIDED
+from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.pinocchio import PinocchioReleased
 from fourbar_validation.engines.registry import ENGINES
@@ -142,6 +143,14 @@ def test_a_tree_without_a_mass_matrix_is_refused_by_its_reason(bar):
     without = relink(scene, **{bar: Bar(getattr(scene.linkage, bar).length)})
     answer = PinocchioReleased().release(without, np.zeros(1))
     assert answer.refusal.endswith("no inertia: the open tree has no mass matrix")
+
+
+def test_a_load_over_theta_2_is_a_declared_limit_of_mujoco():
+    """As every limit that an engine raises."""
+    over = Load(4, moment=0.1, table=Table((0.0, tau), (1.0, 1.0)))
+    pushed = recommand(replace(falling(), loads=(over,)), free=Free(0.01, 2))
+    refused = row(judge("pushed", pushed).rows, "mujoco-forward", "all")
+    assert refused.verdict == REFUSES and refused.reason.startswith("a load that is")
 
 
 TRUE = PinocchioReleased.release

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fourbar.errors import FAILED, HOLDS, write_count
+from fourbar.errors import FAILED, HOLDS, LimitError, write_count
 from fourbar.quantities import Array
 from fourbar.writing import write_text
 from fourbar_validation.compare.answer import EngineError
@@ -179,10 +179,15 @@ def make_breakdown(
     """Return the row of an engine that broke down.
 
     An engine breaks down if it raises, takes its process with it, or never comes back.
+    A declared limit that it raises is no breakdown: it refuses.
 
     `setting`: of the row; names what it broke down in, where it is no answer.
     """
-    if isinstance(error, TimeoutError):
+    verdict = FAILS
+    if isinstance(error, LimitError):
+        verdict = REFUSES
+        reason = str(error)
+    elif isinstance(error, TimeoutError):
         reason = "the engine hung and was stopped"
     elif type(error).__name__ == "ProcessExpired":  # raised by Pebble
         reason = (
@@ -193,7 +198,7 @@ def make_breakdown(
         reason = str(error)
     else:
         reason = say_error(error)
-    return Row.unmeasured(scene, engine, setting, "all", FAILS, reason)
+    return Row.unmeasured(scene, engine, setting, "all", verdict, reason)
 
 
 def say_error(error: BaseException) -> str:

@@ -124,6 +124,8 @@ def test_it_is_run_near_the_requested_positions_and_a_wrong_load_is_seen():
         (Motion(TURN), "nothing to simulate"),
         (Motion(1.0, 10.0), "nothing to run through"),
         (Motion(TURN, 1.0, -5.0), "to rest"),
+        (Motion([1.0, 2.0], [1.0, 2.0]), "omega_2 or alpha_2 differs"),
+        (Motion(theta_4=[1.7, 1.9], omega_4=[1.0, 2.0]), "omega_4 or alpha_4 differs"),
     ],
 )
 def test_refusals_state_their_reason(motion, reason):

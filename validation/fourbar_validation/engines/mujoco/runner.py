@@ -373,7 +373,7 @@ class Lead(RunCourse):
             command = find_angle(command, motion, *loop.cylinder(command.bar))
         self.command = command
         self.values = command.stated[0]
-        self.speed = float(np.max(motion.speed or 0.0))
+        self.speed = float(np.max(motion.speed))
         self.acceleration = float(np.max(motion.acceleration))
         assembled = find_assembled(Assembler(loop, command.bar), command)
         closes = np.array([q is not None for q in assembled])

@@ -123,20 +123,25 @@ class MujocoSimulated:
 
 def _choose_course(scene: Scene, command: Command) -> RunCourse:
     """Choose how a command is run through; LimitError where there is nothing to run."""
-    if scene.motion.free is not None:
+    motion = scene.motion
+    if motion.free is not None:
         raise LimitError("a free motion has no commanded sweep")
     if command.speed is None or not np.any(command.speed):
         raise LimitError(
-            f"{scene.motion.names[1]} is 0 or not stated: nothing to simulate"
-            " through time"
+            f"{motion.names[1]} is 0 or not stated: nothing to simulate through time"
         )
+    course: RunCourse
+    rates = list_speeds(command)
     if command.bar != 2 or command.moves_stroke:
-        return Lead(scene, command)
-    course = RunCourse(scene, command)
-    if course.law is None and np.ptp(list_speeds(command), axis=1).any():
+        course = Lead(scene, command)
+        rates = motion.speed, motion.acceleration
+    else:
+        course = RunCourse(scene, command)
+    if course.law is None and any(map(np.ptp, rates)):
+        _, speed, acceleration = motion.names
         raise LimitError(
-            "omega_2 or alpha_2 differs from position to position: that is no one"
-            " motion through time"
+            f"{speed} or {acceleration} differs from position to position: that is no"
+            " one motion through time"
         )
     return course
 
