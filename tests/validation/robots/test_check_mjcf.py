@@ -583,6 +583,7 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers():
     assert values(examination)["closure.by"] == "nothing"
     assert np.isnan(errors(FEW, examination)["F43"])
     assert errors(FEW, examination)["torque"] > 0.01
+    assert examination.measured.refusal == "nothing closes the loop"
 
 
 @pytest.mark.parametrize("timestep", ["1e-12", "1e9"])

@@ -252,6 +252,7 @@ def test_a_plugin_is_left_out_and_said(tmp_path, inertial):
  | <geom type="sphere" size=".1" name="a<b"/>
  | <geom type="sphere" size=".1"/>\x01
  | <!-- a -- b --><geom type="sphere" size=".1"/>
+ | <!position joint="a" kp="3"/><geom type="sphere" size=".1"/>
 \x20\x20<?xml version='1.0'?>\n | <geom size=".1"/>
 <?xml version=1.0?><?xml version='1.0'?> | <geom size=".1"/>
 a robot\x20 | <geom size=".1"/>

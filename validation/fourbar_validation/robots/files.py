@@ -16,7 +16,7 @@ from fourbar.errors import InputError
 from fourbar.writing import read_text
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
 
-_DROPPED = r"<!--.*?-->|<\?.*?\?>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
+_DROPPED = r"<!--.*?-->|<\?.*?\?>|<![a-z][^>]*>|[\x01-\x08\x0b\x0c\x0e-\x1f]"
 """Comments, declarations and control characters, which MuJoCo's reader lets stand
 anywhere.
 """

@@ -166,12 +166,7 @@ def judge_file(
             at = theirs.measured.command(theirs.measured.states)
             judge = partial(judge_answers, name, theirs.measured, tolerance=tolerance)
             mend = partial(examined, _MENDED, scene, file, held)
-            priced = _price(differences, rows, scene, at, judge, mend)
-            differences = [
-                one
-                for one in priced
-                if one.cost is None or one.cost > _NOTHING or is_setting(one.key)
-            ]
+            differences = [*_price(differences, rows, scene, at, judge, mend)]
     notes = [*theirs.notes]
     if file.kind != "URDF" and (parts := list_unread(file.text)):
         notes.append(f"not looked at: {', '.join(parts)}")
@@ -192,7 +187,7 @@ def _price(
     judge: Callable[..., list[Row]],
     mend: Callable[..., list[LoopMeasurement | None]],
 ) -> Iterator[Difference]:
-    """Yield differences with their costs in accuracy.
+    """Yield differences with their costs in accuracy, but for digits of the scene.
 
     Parameters
     ----------
@@ -205,7 +200,9 @@ def _price(
         if changed is None:
             left.append(one)
         else:
-            yield price(one, judge(answers=[changed]), ())
+            priced = price(one, judge(answers=[changed]), ())
+            if priced.cost is None or priced.cost > _NOTHING:
+                yield priced
     left.sort(key=lambda one: not one.key.endswith(HIDING))
     mended = mend([(one.key, one.generated) for one in left])
     for one, measured in zip(left, mended, strict=True):

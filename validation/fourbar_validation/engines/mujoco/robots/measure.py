@@ -188,6 +188,8 @@ def measure_loop(
     try:
         if not motion[:, 1].any() or len(closing) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
+        if found.see().closed_by == "nothing":
+            raise LimitError("nothing closes the loop")
         through = inside.answer_through_time(closing)
     except LimitError as error:
         refusal = str(error)
