@@ -718,6 +718,7 @@ CYCLE = '<joint name="last"><parent link="rod"/><child link="{}"/></joint>'
         ),
         (LOOP_JOINT, CYCLE.format("rocker"), "'last': closes a loop at rod and rocker"),
         (LOOP_JOINT, CYCLE.format("base"), "'last': closes a loop at rod and base"),
+        (LOOP_JOINT, CYCLE.format("world"), "rod and world, which must both be links"),
     ],
 )
 def test_what_a_loop_joint_of_a_urdf_loses_or_lacks_is_said(

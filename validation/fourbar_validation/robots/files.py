@@ -238,10 +238,16 @@ class _RobotReading:
         )
 
     def _refuse_cycles(self, root: ET.Element) -> None:
-        """Name a joint between links that other joints join already."""
+        """Name a joint between links that other joints join, or that are not there."""
+        known = {link.get("name") for link in root.iter("link")}
         joined = dict[str, set[str]]()
         for joint in root.findall("joint"):
             ends = [end.attrib["link"] for end in joint.findall("*[@link]")]
+            if not known.issuperset(ends):
+                raise self._refuse(
+                    joint.get("name"),
+                    f"joins {' and '.join(ends)}, which must both be links of the file",
+                )
             groups = [joined.get(end, {end}) for end in ends]
             together = set[str]().union(*groups)
             if len(together) < sum(map(len, groups)):

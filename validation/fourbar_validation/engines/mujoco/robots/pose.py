@@ -12,6 +12,7 @@ the loops.
 
 import math
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -97,23 +98,24 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
     InputError : MuJoCo's complaint, or what the file asks too much of, in one line.
     """
     try:
-        spec = mujoco.MjSpec.from_string(file.text, assets=dict(file.assets))
-        if spec.nkey > _MOST_KEYFRAMES:
-            raise InputError(
-                "MJCF",
-                None,
-                f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
-            )
-        _add_loop_joints(spec, file)
-        _part_stand_ins(spec, file)
-        quaternions = {
-            number: tuple(body.quat.tolist())
-            for number, body in enumerate(spec.bodies)
-            if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
-        }
-        other = spec.copy()  # compiling takes what is only visual out of it
-        model, raised = _compile_links(spec, file)
-        masses = _list_unknown_masses(other, file, model)
+        with warnings.catch_warnings(record=True, action="always") as warned:
+            spec = mujoco.MjSpec.from_string(file.text, assets=dict(file.assets))
+            if spec.nkey > _MOST_KEYFRAMES:
+                raise InputError(
+                    "MJCF",
+                    None,
+                    f"asks for {spec.nkey} keyframes; up to {_MOST_KEYFRAMES} are read",
+                )
+            _add_loop_joints(spec, file)
+            _part_stand_ins(spec, file)
+            quaternions = {
+                number: tuple(body.quat.tolist())
+                for number, body in enumerate(spec.bodies)
+                if body.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT
+            }
+            other = spec.copy()  # compiling takes what is only visual out of it
+            model, raised = _compile_links(spec, file)
+            masses = _list_unknown_masses(other, file, model)
     except ValueError as error:
         # its lines are those of a text that is written anew, and not of the file
         stated = re.sub(r", line \d+", "", str(error))
@@ -137,7 +139,8 @@ def compile_robot(file: RobotFile) -> CompiledRobot:
         largest = float(np.abs(getattr(model, name)).max(initial=0.0))
         if not largest < _LARGEST_NUMBER:
             raise InputError("MJCF", None, f"{name} of {largest:g} is out of range")
-    notes = [*file.notes, *raised]
+    said = dict.fromkeys(f"MuJoCo warns: {one.message}" for one in warned)
+    notes = [*file.notes, *raised, *said]
     if left_out := {*file.missing.values()}:
         notes.append(
             f"meshes that are missing are left out: {len(left_out)}, the first of them "
