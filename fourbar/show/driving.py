@@ -13,6 +13,10 @@ _SAME_RATE = 1e-9
 """Difference of two rates of a spline that is round-off, over its largest value. The
 rounding is that of its coefficients.
 """
+_BEGINNING = 1e-100
+"""Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
+its sign.
+"""
 
 
 class Driving(NamedTuple):
@@ -81,6 +85,11 @@ def find_senses(solution: Solution) -> Array:
     before, after = np.append(0.0, moves[:-1]), np.append(moves[1:], 0.0)
     stops = np.where(before == -starts, before, starts)
     return np.stack([np.where(after == starts, starts, stops), stops])
+
+
+def begin_to_move(speed: Any, senses: Any) -> Any:
+    """Return speeds of which those that are 0 begin in a sense, 1 or -1; 0: none."""
+    return np.where(speed == 0.0, _BEGINNING * senses, speed)
 
 
 def leaves_range(solution: Solution) -> Any:

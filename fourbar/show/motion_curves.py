@@ -20,6 +20,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE, PINS
 from fourbar.quantities import NO_LEVER, NO_TORQUE, RATES, Array
 from fourbar.scene import ReleaseOrigin, Scene, command_at
 from fourbar.show.driving import (
+    begin_to_move,
     find_senses,
     is_once_round,
     lacks_friction,
@@ -55,10 +56,6 @@ rest by a square still moves there.
 _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
-"""
-_BEGINNING = 1e-100
-"""Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
-its sign.
 """
 _POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
 _NO_BENDING = 1e-13
@@ -171,14 +168,12 @@ class MotionCurves:
         """
         scene = self.scene
         at = self.solution.at
-        begun: Any = _BEGINNING * senses
         if self.panels.located and scene.motion.law is None:
-            speed = begun[np.argmax(np.abs(begun))]
+            speed = float(begin_to_move(0.0, senses[np.argmax(np.abs(senses))]))
             scene = replace(scene, motion=scene.motion.replace(speed=speed))
             at = command_at(scene, at.places)
         else:
-            stated: Any = at.speed
-            at = at._replace(speed=np.where(stated == 0.0, begun, stated))
+            at = at._replace(speed=begin_to_move(at.speed, senses))
         return describe_motion(solve(scene, at=at))
 
     @cached_property

@@ -615,16 +615,22 @@ def test_the_table_of_another_scene_is_explained(words, read):
 
 
 @mark.parametrize(
-    "part, code, words",
+    "alpha, part, code, words",
     read_rows("""
-0 | 0 | 24 of 24 numbers agree
--0.7 | 0 | friction, not judged: F12_x 12 of 12 numbers agree
-1 | 0 | 12 of torque lie within and agree
-1.01 | 1 | no single known mistake
+0 | 0 | 0 | 24 of 24 numbers agree
+0 | -0.7 | 0 | friction, not judged: F12_x 12 of 12 numbers agree
+0 | 1 | 0 | 12 of torque lie within and agree
+0 | 1.01 | 1 | no single known mistake
+-9 | 0 | 0 | 24 of 24 numbers agree
+-9 | -1 | 0 | 24 of 24 numbers agree
+-9 | -0.7 | 1 | 12 of torque
+-9 | 1 | 1 | 12 of torque
 """),
 )
-def test_dry_friction_holds_a_range_of_torques_at_rest(part, code, words, check):
-    scene = replace(recommand(OURS, speed=0.0), effects=(Friction.at(O2=0.5),))
+def test_dry_friction_holds_a_range_of_torques_at_rest(alpha, part, code, words, check):
+    """Nothing is held where it starts: there the whole of friction acts."""
+    still = recommand(OURS, speed=0.0, acceleration=float(alpha))
+    scene = replace(still, effects=(Friction.at(O2=0.5),))
     numbers = right(scene)
     columns = {
         "theta_2": numbers["theta_2"],

@@ -26,6 +26,7 @@ from fourbar.quantities import (
 from fourbar.scene import Scene
 from fourbar.show.acting import list_springs
 from fourbar.show.derived import derive
+from fourbar.show.driving import begin_to_move, find_senses, leaves_range
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.check.row_commands import (
@@ -197,9 +198,22 @@ class JudgedColumn:
     def nearest(self) -> Array:
         """Right number that is nearest to theirs.
 
-        A drive that dry friction holds at rest has a range of them.
+        A drive that dry friction holds at rest has a range of them. One that starts or
+        stops is stated with the whole of it or, as a solution has it, without.
         """
-        return self._approach(self.ours, self.judge.holds)
+        nearest = self._approach(self.ours, self.judge.holds).copy()
+        for ours in map(self.take, self.judge.begun):
+            apart, so_far = (
+                compute_difference(
+                    self.quantity,
+                    right,
+                    np.where(np.isnan(self.theirs), right, self.theirs),
+                )
+                for right in (ours, nearest)
+            )
+            closer = apart < so_far
+            nearest[closer] = ours[closer]
+        return nearest
 
     def _approach(self, ours: Array, rows: Mask) -> Array:
         """Give a drive the number nearest to theirs that dry friction holds in rows."""
@@ -415,10 +429,20 @@ class Judge:
     @cached_property
     def holds(self) -> Mask:
         """Rows in which dry friction holds a range of drives, (n,)."""
-        low, high = (getattr(self.right, name) for name in self.drive[2:])
-        if low is None:
-            return np.zeros(len(self.right), dtype=bool)
-        return np.asarray(low < high)
+        return np.asarray(leaves_range(self.right))
+
+    @cached_property
+    def begun(self) -> list[Solution]:
+        """Solutions with the whole of dry friction where rows start or stop by it.
+
+        A row that turns back has it in the one sense or the other.
+        """
+        senses = find_senses(self.right)
+        begun = begin_to_move(self.at.speed, senses) if senses.any() else []
+        return [
+            solve(self.scene, self.stage, at=self.at._replace(speed=speed))
+            for speed in begun
+        ]
 
     @cached_property
     def held(self) -> Mask:
