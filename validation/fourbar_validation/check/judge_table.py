@@ -13,6 +13,7 @@ import numpy as np
 
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
+from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import (
     COUPLE,
     LINE,
@@ -123,7 +124,7 @@ def find_made_of(name: str, scene: Scene) -> str:
     start = name[:2] if name[:2] in ("v_", "a_") else ""
     point = name.removeprefix(start)
     bar = next(each.bar for each in scene.points if each.name == point)
-    return f"{start}G{bar}"
+    return f"{start}G{bar}" if bar in MOVING_BARS else f"{start}A"
 
 
 def compute_column(solution: Solution, name: str) -> Array | None:
