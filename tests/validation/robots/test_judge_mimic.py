@@ -408,6 +408,7 @@ def test_the_side_of_a_scene_is_that_of_its_drawing_its_range_or_stated(
     scene = replace(drawn, **change)
     report = measure_mimic(path, "knuckle", scene, angles=angles)
     assert told in shown(report)
+    assert report.equality.remark == ""
     if "another" not in told:
         errors = np.degrees([report.file.angle, report.centred])
         assert errors == approx([1.0203, 0.69427], abs=1e-4)

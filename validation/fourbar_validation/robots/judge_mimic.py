@@ -317,11 +317,14 @@ def show_mimic(report: _MimicReport) -> None:
         f" {equality.leader} by polycoef"
         f" {_write_coefficients(equality.coefficients)}; {_write_theta_2(report)}"
     )
+    if equality.remark:
+        print_sentence(equality.remark)
     if not equality.is_side_told:
         print_sentence(
             "nothing tells from which side the scene is drawn: the tip of the axis of"
             f" {equality.leader} is assumed, and --pose theta_2=ANGLE states another"
-            " where theta_2 differs there"
+            " where theta_2 differs there; where it does not, a mirrored scene (angles"
+            " and y of pins negated, the other branch) is seen from behind"
         )
     print_sentence(_write_errors(report))
     for largest, zero in report.zeros[1:]:

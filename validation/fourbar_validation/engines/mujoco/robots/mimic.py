@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.linkage import Bar, record
+from fourbar.linkage import BAR_NAMES, Bar, record
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
@@ -18,9 +18,10 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_parent,
     find_roots,
     list_followers,
+    list_joints,
     name_joint,
 )
-from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile
+from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, write_length
 from fourbar_validation.engines.mujoco.robots.loop_scene import is_seen_from_behind
 from fourbar_validation.engines.mujoco.robots.pose import (
     HINGE_JOINT,
@@ -70,6 +71,8 @@ class JointEquality:
     """Bar that the follower turns, and the one that it turns against: 1 to 4."""
     limits: tuple[float, float] | None
     """Range of the leader in the file, rad; None where it has none."""
+    remark: str
+    """Length of the bearer that is another in the scene; empty if it is the same."""
 
     @property
     def swing(self) -> tuple[float, float] | None:
@@ -132,6 +135,7 @@ class _RestPose:
                 )
         self.data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, self.data)
+        self.roots = find_roots(model, set())
         self.axes = np.zeros((2, 3))
         """x along the ground and y in the plane, (2, 3), once the ground is found."""
 
@@ -142,6 +146,7 @@ class _RestPose:
         follower, leader, coefficients = self.tie
         sense = math.copysign(1.0, self.data.xaxis[follower] @ self.data.xaxis[leader])
         bars = self._find_bars(follower)
+        remark = self._compare_length(follower, bars[1])
         # angles of the bars from the ground's line, seen from the tip of the axis
         angles = [0.0, math.nan, math.nan, math.nan]
         turn = 0.0
@@ -175,6 +180,7 @@ class _RestPose:
                 True,
                 bars,
                 limits,
+                remark,
             )
 
         ways = (see(1.0), see(-1.0))
@@ -187,7 +193,7 @@ class _RestPose:
     def _find_bars(self, follower: int) -> tuple[int, int]:
         """Return the bar that a follower turns, and the bar that bears it."""
         model = self.model
-        roots = find_roots(model, set())
+        roots = self.roots
         crank = model.jnt_bodyid[self.tie.leader]
         ground = roots[find_parent(model, crank)]
         bearer = roots[find_parent(model, model.jnt_bodyid[follower])]
@@ -198,6 +204,27 @@ class _RestPose:
         if roots[find_parent(model, bearer)] == crank:
             return 4, 3
         return 3, 4
+
+    def _find_line(self, joint: int, other: int) -> Array:
+        """Return the way between two hinges across the leader's axis, (3,), m."""
+        normal = self.data.xaxis[self.tie.leader]
+        line = self.data.xanchor[joint] - self.data.xanchor[other]
+        return np.asarray(line - normal * (normal @ line))
+
+    def _compare_length(self, follower: int, bearer: int) -> str:
+        """Say that the hinges of the follower's bearer are not those of the scene."""
+        model = self.model
+        body = self.roots[find_parent(model, model.jnt_bodyid[follower])]
+        other = self.tie.leader if bearer == 1 else list_joints(model, body)[0]
+        length = float(np.linalg.norm(self._find_line(follower, other)))
+        in_scene = self.scene.linkage.lengths[bearer - 1]
+        if _is_same_number(length, in_scene):
+            return ""
+        joints = " and ".join(name_joint(model, one) for one in (other, follower))
+        return (
+            f"the {BAR_NAMES[bearer]} of the scene is {write_length(in_scene)} mm long,"
+            f" but {joints} are {write_length(length)} mm apart in the file"
+        )
 
     def _find_rocker(self) -> int | None:
         """Find the hinge that bears the output on the ground, and take its axes.
@@ -210,9 +237,8 @@ class _RestPose:
         ties = chain.from_iterable(list_followers(model, n) for n in range(model.neq))
         joints = [follower, *(tie.joint for tie in ties if tie.leader == leader)]
         normal = self.data.xaxis[leader]
-        across = np.eye(3) - np.outer(normal, normal)
         for joint in joints:
-            line = across @ (self.data.xanchor[joint] - self.data.xanchor[leader])
+            line = self._find_line(joint, leader)
             length = float(np.linalg.norm(line))
             is_ground = _is_same_number(length, self.scene.linkage.lengths[0])
             if is_ground and self._find_bars(joint) == (4, 1):
