@@ -95,7 +95,7 @@ def test_what_is_missing_is_named_by_its_part(parts, tmp_path, refusal):
 
 def test_parts_of_another_run_are_refused(parts, run, refusal):
     said = refusal(parts[0], run("other", "--seed", "1", "--part", "2/3"), parts[2])
-    assert "other" in said and "is of another run: it differs in scenes" in said
+    assert "other" in said and "makes here now: it differs in scenes" in said
     marker = Path(parts[1], "run.json")
     judged_with = json.loads(marker.read_text()) | {"code": "of yesterday"}
     marker.write_text(json.dumps(judged_with))

@@ -104,7 +104,10 @@ class Store:
             why = "must hold a run.json and the parts that `run --part` wrote"
             raise InputError("DIR", str(self.folder), why)
         if difference := self._name_difference(marker):
-            why = f"is of another run: it differs in {difference}"
+            why = (
+                "is no part of the run that the command of the first DIR makes here"
+                f" now: it differs in {difference}"
+            )
             raise InputError("DIR", str(self.folder), why)
 
     def done(self) -> set[int]:
