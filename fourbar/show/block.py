@@ -669,7 +669,8 @@ class SceneBlock(Facts):
     ) -> list[tuple[str, list[str]]]:
         """List the row of what a linkage at rest bears as it begins to move.
 
-        The list is empty where dry friction does not hold the linkage, or adds nothing.
+        Stresses stand below that of bending moments. The list is empty where dry
+        friction does not hold the linkage, or adds nothing.
         """
         ways = self.motion.begun
         if ways[0] is self.motion:
@@ -681,7 +682,8 @@ class SceneBlock(Facts):
             sizes.append(max(known) if len(known) == len(ways) else None)
         cells = self._cells(sizes, unit, "unbounded")
         adds = cells != self._write_peaks(names, unit)[0]
-        return [("  to move", cells)] if adds else []
+        stresses = self._list_stresses(sizes) if unit == "N m" else []
+        return [("  to move", cells), *stresses] if adds else []
 
     def _write_bending(self) -> Iterator[str]:
         """Write the largest bending moment of each bar, with its place and position."""
@@ -691,25 +693,36 @@ class SceneBlock(Facts):
         if not from_rest and all(peak and not peak.value for peak in peaks):
             return
         moments, places = self._write_peaks(_BENDING, "N m")
-        stresses = list[float | None]()
-        for index, (number, (peak, x, *_)) in enumerate(bending.items()):
+        for index, (peak, x, *_) in enumerate(bending.values()):
             if peak and peak.value:
                 along = self._value(x, "m", self.longest)
                 over = "" if self.kind == "position" else f", {places[index]}"
                 places[index] = along + over
-            # a bar without a cross-section has none
-            modulus = self.linkage.bar(number).section_modulus
-            stresses.append(peak.value / modulus if peak and modulus else None)
         rows = [
             ("bending", [f"bar {bar}" for bar in bending]),
             ("  moment", moments),
             ("  at x", places),
+            *self._list_stresses([peak and peak.value for peak in peaks]),
+            *from_rest,
         ]
-        if stresses != [None] * len(stresses):
-            rows.append(("  stress", self._cells(stresses, "Pa")))
-        rows += from_rest
         yield from _align(rows, self.width)
         yield from list_couple_notes(self.scene)
+
+    def _list_stresses(
+        self, moments: Sequence[float | None]
+    ) -> list[tuple[str, list[str]]]:
+        """List the row of stresses by bending moments of bars 2, 3 and 4.
+
+        A bar without a cross-section has none.
+        """
+        moduli = [bar.section_modulus for bar in self.linkage.moving]
+        stresses = [
+            None if moment is None or not modulus else moment / modulus
+            for moment, modulus in zip(moments, moduli, strict=True)
+        ]
+        if stresses.count(None) == len(stresses):
+            return []
+        return [("  stress", self._cells(stresses, "Pa"))]
 
     def _write_peaks(
         self, names: Sequence[str], unit: str

@@ -60,6 +60,7 @@ from tests.support.scenes import (
     cis,
     crank_rocker,
     find_angle,
+    relink,
     thesis,
 )
 
@@ -660,11 +661,12 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
     """The peaks of the motion either way, slow enough for its inertia not to show."""
     effects = (*WEIGHT, PinFriction.at(A=(0.3, 0.02), B=(0.2, 0.03)))
     rubbing = {"loads": (SPIKE,), "effects": effects, "drive": CYLINDER}
+    coupler = replace(crank_rocker().linkage.coupler, section=(0.02, 0.01))
     at_rest, *ways = (
-        solve(crank_rocker(Motion(angle, speed), **rubbing))
+        solve(relink(crank_rocker(Motion(angle, speed), **rubbing), coupler=coupler))
         for speed in (0.0, 1e-9, -1e-9)
     )
-    lines = SceneBlock(at_rest, units("N N.m")).write()
+    lines = SceneBlock(at_rest, units("N N.m Pa")).write()
     rows = [line for line in lines if line.startswith("  to move")]
     names = [*PIN_FORCES], ["bending_2", "bending_3", "bending_4"]
     motions = [Facts(way).motion for way in ways]
@@ -672,6 +674,9 @@ def test_pins_and_bars_at_rest_bear_what_moves_them_against_friction(angle):
         sizes = [[motion.find_peak(name).value for motion in motions] for name in group]
         printed = [float(size) for size in re.findall(r"\d[\d.]*", row)]
         assert printed == approx(np.max(sizes, axis=1), rel=2e-4)
+    *_, stress = (line for line in lines if line.startswith("  stress"))
+    largest = np.max(sizes[1]) / (0.01 * 0.02**2 / 6.0)
+    assert float(stress.split()[2]) == approx(largest, rel=2e-4)
     assert "to move" not in block(crank_rocker(Motion(angle, 0.0)))
 
 
