@@ -187,12 +187,20 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
         of_name = dict.fromkeys(derivatives.keys, no_change)
         changes.append(of_name | {row.key: row.change for row in ranked})
     without = [status for status in derivatives.status if status != "ok"]
-    if without:
+    lacking = [
+        key
+        for row, key in enumerate(derivatives.keys)
+        if any(np.isnan(derivatives.by[name][row]).any() for name in names)
+    ]
+    if without and lacking:
         counts = ", ".join(
             f"{without.count(word)} {word.replace('_', ' ')}"
             for word in dict.fromkeys(without)
         )
-        lines.append(f"positions without all derivatives: {counts}")
+        by = "all derivatives"
+        if len(lacking) < len(derivatives.keys):
+            by = f"derivatives by {', '.join(lacking)}"
+        lines.append(f"positions without {by}: {counts}")
     rows = [largest]
     for key in sorted(shares, key=lambda key: -shares[key]):
         rows.append([key, *(write_cell(of_name[key], ".3g") for of_name in changes)])
@@ -342,7 +350,7 @@ def _count_equilibria(rest: Equilibria, reached: int, units: Conversion) -> list
         for ends in rest.indifferent
     ]
     lines += [
-        f"friction alone holds, without an equilibrium: {_write_range(rest, ends)}"
+        f"friction holds, about no single equilibrium: {_write_range(rest, ends)}"
         for ends in rest.held
         if all(position.held != ends for position in rest.found)
     ]

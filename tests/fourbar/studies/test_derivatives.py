@@ -95,6 +95,8 @@ def test_a_linkage_that_stands_has_the_derivatives_without_dry_friction(dry):
             assert_allclose(rest.of(name, key), differences, rtol=1e-6, atol=1e-9)
     text = write_sensitivity(rest, None)
     assert max(map(len, text.split("\n"))) <= BLOCK_WIDTH and "torque_low" in text
+    said = f"without derivatives by motion.omega_2: {len(ANGLES)} at rest"
+    assert said in text
 
 
 def test_the_largest_share_comes_first_and_rounding_is_no_influence():
