@@ -597,6 +597,28 @@ def test_a_bar_that_is_pinned_on_the_axis_of_another_hinge_stands():
     )
 
 
+TRUSS = """
+<mujoco><worldbody>
+<body name="p"><joint name="h" type="slide"/><joint axis="0 1 0"/><geom size=".01"/>
+ <body pos="0 0 .1"><joint axis="0 1 0"/><geom size=".01"/>
+  <body pos=".03 0 .04"><joint axis="0 1 0"/><geom size=".01"/>
+   <site name="b" pos=".04 0 .03"/></body></body></body>
+<body name="q" pos="{} 0 0"><joint axis="0 1 0"/><geom size=".01"/>
+ <body pos="0 0 .1"><joint axis="0 1 0"/><geom size=".01"/>
+  <site name="c" pos="-.03 0 .07"/></body></body>
+</worldbody><equality><connect body1="p" body2="q" anchor=".05 0 .05"/>
+<connect site1="b" site2="c"/></equality></mujoco>
+"""
+
+
+def test_three_pins_of_a_triangle_stand_unless_two_are_on_one_axis():
+    truss, four_bar = report_of(TRUSS.format(0.1), held=("h",)).closures
+    assert truss.reason == "3 hinges in a plane cannot move"
+    assert four_bar.loop.lengths == approx((0.1, 0.05, 0.05, math.hypot(0.03, 0.07)))
+    _, turning = report_of(TRUSS.format(0.0), held=("h",)).closures
+    assert "moves its bars too" in turning.reason
+
+
 TWO_FINGERS = """
 <mujoco><worldbody>
 <body pos="0 0 0"><joint axis="0 1 0"/><geom size=".01"/>

@@ -245,17 +245,21 @@ class _Finder:
         """Name of each equality, which no other has."""
         self.held = {find_joint(model, name, "--hold") for name in self.options.held}
         self.root = find_roots(model, self.held)
-        self.standing: dict[int, int] = {}
-        """Hinge that cannot turn, by the closure that holds it.
+        self.standing: dict[int, list[int]] = {}
+        """Hinges that cannot turn, by the closure that holds them.
 
         A closure of two hinges that lies on the axis of one leaves this one free. The
-        other hinge stands.
+        other hinge stands. Three pins of a triangle stand too, where joints are held.
         """
         for number in list_closing(model):
             chain = _Chain(self, number)
             is_of_two = chain.is_pin and len(chain.joints) == 2
-            if chain.is_active and is_of_two and len(chain.away) == 1:
-                (self.standing[number],) = chain.away
+            if (
+                chain.is_active
+                and is_of_two
+                and (len(chain.away) == 1 or self._is_triangle(chain))
+            ):
+                self.standing[number] = chain.away
                 self.held.update(chain.away)
         self.root = find_roots(model, self.held)
         self.chains = {one: _Chain(self, one) for one in list_closing(model)}
@@ -263,6 +267,15 @@ class _Finder:
         self.before = mujoco.MjData(model)
         self.before.qpos[:] = posed.stated
         mujoco.mj_kinematics(model, self.before)
+
+    def _is_triangle(self, chain: _Chain) -> bool:
+        """Tell whether two parallel hinges, off each other and the closure, stand."""
+        is_planar = len(chain.hinges) == len(chain.away) == 2 and chain.skew <= PARALLEL
+        if not (self.options.held and is_planar):
+            return False
+        first, second = self.data.xanchor[chain.hinges]
+        arm = np.cross(first - second, self.data.xaxis[chain.hinges[0]])
+        return bool(np.linalg.norm(arm) > LARGEST_RESIDUAL)
 
     def join(self, joint: int) -> tuple[int, int]:
         """Return the bar that a joint turns, and the one that bears it."""
@@ -354,7 +367,9 @@ class _Finder:
         if not chain.is_active:
             yield _SWITCHED_OFF
         if not chain.joints:
-            yield "both ends are on one rigid body"
+            stands = chain.number in self.standing
+            why = "3 hinges in a plane cannot move"
+            yield why if stands else "both ends are on one rigid body"
         if chain.is_idle:
             yield self._explain_idle(chain)
         model = self.model
@@ -389,7 +404,7 @@ class _Finder:
         names = ", ".join(name_joint(self.model, joint) for joint in chain.joints)
         text = f"it lies on the axis of {names} and leaves it free"
         if chain.number in self.standing:
-            stands = name_joint(self.model, self.standing[chain.number])
+            stands = name_joint(self.model, *self.standing[chain.number])
             text += f"; {stands} cannot turn by it, and counts as held"
         return text
 
