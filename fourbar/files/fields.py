@@ -50,7 +50,8 @@ _WAYS = {
     ),
     **dict.fromkeys(
         ("stroke", "stroke_speed", "stroke_acceleration"),
-        "write it under [motion], as a number or a list; a law is of an angle",
+        "write it under [motion], as a number or a list; a law is of an angle, and the"
+        " table of a load is over theta_2",
     ),
     **dict.fromkeys(
         ("damper", "dampers", "damping", "damping_coefficient"),
@@ -165,8 +166,9 @@ class Entry:
                     wrong = entry
                     break
             allowed = error.allowed
-            if wrong.value == DRAWN_WORD and not self.file.drawn:
-                allowed += f'; "{DRAWN_WORD}" needs [pins]'
+            if wrong.value == DRAWN_WORD:
+                of = "an angle or a stroke directly under [motion] alone"
+                allowed += f'; "{DRAWN_WORD}" needs [pins], and stands for {of}'
             raise wrong.refuse(allowed) from None
 
     def declared(self, by: Declared) -> Any:

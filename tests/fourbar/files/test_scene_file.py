@@ -104,6 +104,8 @@ force = ["3 N", "40 deg"]\nfrom_pin = ["5 cm", "0 deg"]\n |  | loads[0] | force
 force = ["3 N", "40 deg"] | torque = "1 N m" | loads[0].torque | moment
 "60 deg" | "60" | motion.theta_2 | the unit is missing
 "60 deg" | "drawn" | motion.theta_2 = 'drawn' | "drawn" needs [pins]
+branch = "open" | law = { time = ["drawn"] } | directly under [motion] alone
+bar = 4 | bar = 4\ntable.stroke = ["1 m", "2 m"] | table.stroke | is over theta_2
 "60 deg" | ["1 deg", 2] | motion.theta_2[1] = 2 | like "1 rad"
 "60 deg" | "60 Grad" | motion.theta_2 | "Grad" is not known
 [[loads]] | [loads] | loads | [[loads]]
