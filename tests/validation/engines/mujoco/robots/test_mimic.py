@@ -32,7 +32,7 @@ def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path):
     assert round(equality.leader_zero, 6) == 0.523599
     assert equality.sense == -1.0
     assert math.isnan(equality.theta_2)
-    assert equality.remark.endswith("lead and follow are 0.000 mm apart in the file")
+    assert equality.remark.endswith("but follow is 0.000 mm from lead in the file")
 
 
 TENDONS = """<mujoco><worldbody>

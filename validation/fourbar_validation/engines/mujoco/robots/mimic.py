@@ -18,7 +18,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_parent,
     find_roots,
     list_followers,
-    list_joints,
     name_joint,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotFile, write_length
@@ -214,16 +213,18 @@ class _RestPose:
     def _compare_length(self, follower: int, bearer: int) -> str:
         """Say that the hinges of the follower's bearer are not those of the scene."""
         model = self.model
-        body = self.roots[find_parent(model, model.jnt_bodyid[follower])]
-        other = self.tie.leader if bearer == 1 else list_joints(model, body)[0]
+        other = self.tie.leader
+        if bearer > 1:
+            body = self.roots[find_parent(model, model.jnt_bodyid[follower])]
+            other = model.body_jntadr[body]
         length = float(np.linalg.norm(self._find_line(follower, other)))
         in_scene = self.scene.linkage.lengths[bearer - 1]
         if _is_same_number(length, in_scene):
             return ""
-        joints = " and ".join(name_joint(model, one) for one in (other, follower))
         return (
             f"the {BAR_NAMES[bearer]} of the scene is {write_length(in_scene)} mm long,"
-            f" but {joints} are {write_length(length)} mm apart in the file"
+            f" but {name_joint(model, follower)} is {write_length(length)} mm from"
+            f" {name_joint(model, other)} in the file"
         )
 
     def _find_rocker(self) -> int | None:
