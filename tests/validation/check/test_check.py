@@ -441,9 +441,13 @@ IN_CRANK_ROCKER = {
     "from another zero: theta_2 -118 deg": shifted(
         lambda theta: theta - radians(118.0)
     ),
+    "from another zero: theta_2 +90 deg": shifted(lambda theta: theta + radians(90.0)),
     "read as degrees": shifted(np.radians),
     "relative to bar 2": relative_to("theta_2"),
-    "omega_2 0.5 times ours": solved(speed=5.0),
+    **{
+        f"omega_2 {factor} times ours": solved(speed=10.0 * factor)
+        for factor in (0.5, 6)
+    },
     "theta_2 counted clockwise, with all angles and torques": mirrored(1.0),
     "all angles and torques, and y reversed": mirrored((1.0, -1.0)),
     "one step late: numbers of the position before": changed(
@@ -494,7 +498,7 @@ for name, words, names, factor in UNITS_TAKEN:
 )
 def test_a_known_mistake_is_the_first_explanation(name, words, judged):
     scene = SCENES[name]
-    judgement = judged(scene, MISTAKES[name][words](scene))
+    judgement = judged(scene, MISTAKES[name][words](scene), ALL, 9)
     assert judgement.differing
     first = judgement.explanations[0]
     assert words in first.text and first.complete

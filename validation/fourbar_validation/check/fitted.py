@@ -79,9 +79,13 @@ NEWTON = 9
 is a sixth of the right one takes eight steps.
 """
 FIT_STEP = 1e-6
-"""Step of the finite difference from which the fit finds its slope, rad."""
+"""Step of the finite difference from which the fit finds its slope."""
 _IN_VAIN = 0.9
-"""Part of a misfit that the slopes leave of it, above which a fit is given up."""
+"""Part of a misfit that a step leaves of it, above which a fit is given up."""
+_PARTS_OF_A_STEP = (1.0, 0.25)
+"""Parts of a step of which the first that is nearer is taken: towards a speed that is
+many times ours the slopes lead too far.
+"""
 
 
 def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -224,25 +228,37 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     if not columns:
         return
     right = _compute_residual(columns, Mistake("", judge.right.__getitem__)).ravel()
+    allowed = [
+        np.full_like(column.theirs.T, column.judged_right[1]).T for column in columns
+    ]
+    rounding = np.column_stack(allowed).ravel()
     scene = state_all(judge.scene)
     at = drop_remainder(judge.at)
     jumps = any(isinstance(one, Friction | PinFriction) for one in scene.effects)
     for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
-        fitted = _fit(columns, family, right, jumps)
+        fitted = _fit(columns, family, right, rounding, jumps)
         for number in () if fitted is None else (float(round(fitted)), fitted):
             if abs(number) > LEAST_NUMBER:
                 mistake = family.make(number)
                 if mistake.text.endswith(FITTED) or not family.of_ours:
                     mistake = mistake._replace(times=CARRIED)
                 yield mistake
+                left = _compute_residual(columns, mistake).ravel()
+                if np.all(np.abs(left) <= CARRIED * rounding):
+                    break
 
 
 def _fit(
-    columns: list[JudgedColumn], family: _Family, here: Array, jumps: bool
+    columns: list[JudgedColumn],
+    family: _Family,
+    here: Array,
+    rounding: Array,
+    jumps: bool,
 ) -> float | None:
     """Fit the number of a family; None if no other fits better than its first.
 
     `here`: residual at this one, which is that of the right number if it is ours.
+    `rounding`: what is allowed of each residual, by which the last step weighs them.
     `jumps`: whether friction may reverse, so that slopes are looked at on both sides.
     """
     number = family.start
@@ -260,17 +276,31 @@ def _fit(
         # a number that jumps beside the position, as friction does, has no slope
         smooth = np.abs(less + more - 2.0 * here) < 0.5 * np.abs(less - more)
         slope = np.where(smooth, less - more, 0.0) / (2.0 * FIT_STEP)
-        known = np.isfinite(here) & np.isfinite(slope)
-        slopes = slope[known]
-        change = float(divide(slopes @ here[known], slopes @ slopes))
+        change = _find_change(here, slope)
         size = _find_size(here)
-        if step == 0 and _find_size(here[known] - slopes * change) > _IN_VAIN * size:
+        left = _find_size(here - slope * change)
+        if family.of_ours and step == 0 and left > _IN_VAIN * size:
             return None
-        number -= change
-        here = measure(number)
-        if not _find_size(here) < 0.5 * size:
-            return number if step > 0 else None
-    return number
+        for part in _PARTS_OF_A_STEP:
+            tried = number - part * change
+            there = measure(tried)
+            if _find_size(there) < size:
+                break
+        else:
+            break
+        number, here = tried, there
+        if not _find_size(here) < _IN_VAIN * size:
+            break
+    if family.of_ours and number == family.start:
+        return None
+    return number - _find_change(here / rounding, slope / rounding)
+
+
+def _find_change(residual: Array, slope: Array) -> float:
+    """Return the change of a number that leaves the least squares, by its slopes."""
+    known = np.isfinite(residual) & np.isfinite(slope)
+    slopes = slope[known]
+    return float(divide(slopes @ residual[known], slopes @ slopes))
 
 
 def _find_size(residual: Array) -> float:
@@ -321,17 +351,17 @@ def _list_commands(
     misfits = shares.reshape(len(tried), -1).mean(axis=1)
     if misfits.min() < PROMISING:
         start = float(tried[np.argmin(misfits)])
-        yield _Family(start, partial(_turn, scene, at), of_ours=False)
+        yield _Family(math.degrees(start), partial(_turn, scene, at), of_ours=False)
 
 
 def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
-    """Return the problem of angles that are counted from another zero."""
-    degrees = math.degrees(math.remainder(offset, TURN))
+    """Return the problem of angles that are counted from another zero, deg."""
     text = (
         f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
-        f" {at.commanded} {degrees:+.6g} deg is what they solved"
+        f" {at.commanded} {math.remainder(offset, 360.0):+.6g} deg is what they solved"
     )
-    return solve_other(text, scene, at._replace(angle=at.angle + offset))
+    angle = at.angle + math.radians(offset)
+    return solve_other(text, scene, at._replace(angle=angle))
 
 
 def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
