@@ -98,7 +98,8 @@ def read_column(solution: Solution, name: str) -> Column:
     numbers = _list_numbers(solution)
     if name in numbers:
         return _read_number(solution, name)
-    velocities = {f"{_ALONG}{point}": f"v_{point}" for point in solution.points}
+    points = ("A", "B", *solution.points)
+    velocities = {f"{_ALONG}{point}": f"v_{point}" for point in points}
     # the sign of a difference may also stand in the name of a point
     words = name.split("-")
     for count in range(1, len(words)):
@@ -109,6 +110,8 @@ def read_column(solution: Solution, name: str) -> Column:
     above, divides, below = map(str.strip, name.partition("/"))
     if not divides:
         raise _refuse_name(solution, name)
+    if above in velocities and below not in {**numbers, **velocities}:
+        raise _refuse_name(solution, below)
     if above in velocities and below in velocities:
         # by virtual work the forces are as the speeds, the other way round
         above, below = velocities[below], velocities[above]

@@ -54,6 +54,9 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     assert ratio.values == approx(np.hypot(*s.F12.T) / np.hypot(*s.F14.T))
     assert torque.label({}) == "N m/N" and ratio.label({}) == ""
     assert torque.shown({"N m": ("N mm", 1e3)}) == approx(1e3 * torque.values)
+    at_A = TURN.linkage.input.length * np.abs(s.omega_2)
+    (along,) = choose_columns(s, "F_A/F_P")
+    assert along.values == approx(np.hypot(*s.velocity["P"].T) / at_A)
 
 
 UNKNOWN = read_rows("""
@@ -62,6 +65,7 @@ F12_z | F12_x is a component
 torque_x | must be among torque, time
 P/F12 | is a place: P_x or P_y
 drive_force | must be among time, theta_2
+F_P/F_Q | columns = 'F_Q': must be among
 F34_y | is the reaction of F43_y: minus it
 """)
 
