@@ -258,10 +258,10 @@ class Load(Effect):
         model.loads.append(self)
 
     def couple_on_drive(self, linkage: FourBar, speed: float) -> float:
-        """Return the greatest force at the longest arm.
+        """Return the couple that the load may ask of the drive, N m.
 
-        The force counts with its lever, the couple over the bar's length; the load is
-        a settled one.
+        The greatest force, with its lever, acts at the longest bar; the couple counts
+        over the bar's length. The load is a settled one.
         """
         bar = linkage.bar(self.bar)
         total = abs(self.moment) / bar.length

@@ -396,11 +396,12 @@ class Case(NamedTuple):
         acceleration: Any,
         effort: Any,
     ) -> tuple[Any, Any, Any]:
-        """Compute the least and greatest torque or force of the drive.
+        """Compute the least and greatest torque (N m) or force (N) of the drive, (n,).
 
-        Both are equal unless dry friction holds a pin at rest. The third value is
-        `JAMMED` where one of them is NaN because friction jams the motion that would
-        begin; None: nowhere. The ends are those at which the linkage would begin to
+        Both are equal unless dry friction holds a pin at rest. The third value, (n,),
+        is `JAMMED` where one of them is NaN because friction jams the motion that would
+        begin, else 0; None: it jams nowhere. `effort`: that with friction at rest as 0.
+        The ends are those at which the linkage would begin to
         move forwards or backwards, or, where only a pin comes to rest while the linkage
         moves, those just before and after its reversal.
         """

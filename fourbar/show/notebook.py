@@ -17,9 +17,10 @@ POSITIONS_AT_EITHER_END = 5
 
 
 def show_scene(scene: Scene) -> str:
-    """Draw the linkage above its type and the text of the scene, in SI and radians.
+    """Return HTML: the drawing of the linkage, its type, and the text of the scene.
 
-    The drawing is that of `scene.plot("linkage")`.
+    The drawing is that of `scene.plot("linkage")`, the text in SI and radians. Where
+    one of them cannot be made, the reason stands in its place.
     """
     try:
         svg = draw_figure(scene, "linkage")._repr_svg_()

@@ -36,7 +36,7 @@ from fourbar.quantities import (
     STAGE_OF,
 )
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.engines.exact import find_refusal
+from fourbar_validation.engines.ball_arithmetic import find_refusal
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows
 from tests.support.scenes import EPS, bare, draw_linkage

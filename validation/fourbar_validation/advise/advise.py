@@ -1,8 +1,9 @@
 """The cheapest settings of MuJoCo within a required error on a given scene.
 
-The error is that of torque and pin forces. The laws of the study (`guess`) say where to
-look, and short runs of the scene itself decide. With fitted pads the softness of the
-closure plays no part above 1e-9 (1e-6 in a slow linkage), so that tc may be long.
+The error is that of torque and pin forces. The laws that `guess` of
+engines/mujoco/trial.py holds say where to look, and short runs of the scene itself
+decide. With fitted pads the softness of the closure plays no part above 1e-9 (1e-6 in a
+slow linkage), so that tc may be long.
 """
 
 import math

@@ -567,7 +567,7 @@ class _Loop:
         return unit
 
     def solve_thirteen(self, unit: _Wrenches) -> tuple[dict[str, ComplexBall], Ball]:
-        """Solve for the pin forces and the driving torque or force.
+        """Solve for pin forces, complex, N, and the drive, N m or N, at one position.
 
         Raises ZeroDivisionError where they are singular to working precision. Unknowns
         are F12 F32 F23 F43 F14 F34 (x, y each) and the drive, of which one acts as

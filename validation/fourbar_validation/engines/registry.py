@@ -35,7 +35,7 @@ from fourbar_validation.compare.tolerance import (
     Mask,
 )
 from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.exact import BallArithmetic, shift_to
+from fourbar_validation.engines.ball_arithmetic import BallArithmetic, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import (

@@ -51,8 +51,8 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     mark_touching,
 )
+from fourbar_validation.engines.ball_arithmetic import compute_exact_sines
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.exact import compute_exact_sines
 from fourbar_validation.engines.free_body import count_solutions
 from fourbar_validation.engines.registry import find_missing
 from fourbar_validation.run.question import Question, select_positions, spread_evenly
@@ -313,9 +313,9 @@ def _compare_status(question: Question, reference: Solution) -> Row:
 
 
 def _mark_other_numbers(question: Question) -> Mask:
-    """Mark, of a few positions, those where friction has another number of solutions.
+    """Mark where the formulas state one solution of friction for several, (n,).
 
-    The formulas state one or several.
+    So are positions where it is the reverse. Few are looked at; others are False.
     """
     code = question.solution.status_code
     several = np.flatnonzero(code == SEVERAL)[:POSITIONS_OF_FRICTION]

@@ -37,7 +37,6 @@ from fourbar_validation.regression.record import (
     write_about,
 )
 from fourbar_validation.regression.render import write_change_line
-from fourbar_validation.regression.rules import list_weakened
 from fourbar_validation.regression.scenes import describe_scenes
 from fourbar_validation.report.html import write_html, write_summary_page
 from fourbar_validation.report.run_summary import Summary
@@ -159,12 +158,11 @@ def _hold_against(before: Recorded, summary: Summary, after: Recorded) -> None:
         key = (row.scene, row.engine, row.quantity)
         since = find_since(read_history(before), before, [key])
         summary.since = f"It {since[key]}."
-    weakened = list_weakened(before.about.rules, after.about.rules)
-    summary.weaker = [*map(str, weakened)]
     try:
         differences = find_differences(before, after, {})
     except InputError:  # raised again where the differences are printed
         return
+    summary.weaker = [*map(str, differences.weakened)]
     summary.gone = differences.gone
     if not summary.counts[FAILS]:  # its cause stands first
         lines = differences.of(Kind.GONE).itertuples()

@@ -254,7 +254,10 @@ class _Simulation:
         return float(np.nanmin(factor)) if np.isfinite(factor).any() else 1.0
 
     def _compile_loop(self, supplied: Container[str], settings: Settings) -> ClosedLoop:
-        """Compile a model that takes from `supply_forces` what its text cannot say."""
+        """Compile a model that takes from `supply_forces` what its text cannot say.
+
+        `supplied`: names of the actuators whose force is supplied.
+        """
         text = write_mjcf(take_full_size(self.scene), settings, keyframe=False)
         return receive_forces(ClosedLoop(text), supplied)
 

@@ -318,7 +318,7 @@ class _RestPose:
 
 
 def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Tell whether two ranges of an angle have a common one, whole turns apart."""
+    """Tell whether two ranges (low, high) of an angle, rad, share one modulo turns."""
     (low, high), (first, last) = one, other
     apart = math.remainder((low + high - first - last) / 2.0, math.tau)
     return abs(apart) <= (high - low + last - first) / 2.0
