@@ -333,6 +333,9 @@ plain | type="hinge" | type="hinge" solreffriction="0.1 1" |
 plain | "0.5" | "0.25" | bars.coupler.mass, closure.weight
 plain | 0.9999 0.9999 | 0.95 0.95 | closure.solimp
 plain | "0.5" | "1" | bars.coupler.mass
+# a tendon that exerts nothing
+sprung | </tendon> | <fixed><joint joint="A" coef="1"/></fixed></tendon> | \
+tendons.A, tendons.A.path
 # a servo pulls where it is told nothing, and a motor does not
 sprung | </actuator> | <position tendon="spring_1" kp="100"/></actuator> | \
 tendons.ground output.tension

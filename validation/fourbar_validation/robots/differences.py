@@ -38,8 +38,11 @@ _FINER_ABOVE = ("option.iterations", "option.ls_iterations")
 """Settings of which a smaller or a greater value has the smaller error."""
 ENTRIES_THAT_MAY_LACK = ("loads.", "tendons.", "actuators.")
 """Entries that a file may lack: what is missing on one side is a difference."""
-MISSING_LOAD: dict[str, Value] = {".force": (0.0, 0.0), ".couple": 0.0}
-"""Value of a load that is missing."""
+_MISSING: dict[str, Value] = dict.fromkeys(
+    (".couple", ".stiffness", ".damping", ".frictionloss", ".armature"), 0.0
+)
+_MISSING[".force"] = (0.0, 0.0)
+"""Value of what a missing load or tendon exerts."""
 _REMARKS = tomllib.loads(
     Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 )["remarks"]
@@ -104,8 +107,8 @@ def find_differences(
         if None in entries and not may_lack:
             # one of the files has no use for it, like solver parameters of no friction
             continue
-        loads = (value for end, value in MISSING_LOAD.items() if key.endswith(end))
-        nothing = next(loads, None)
+        zeros = (value for end, value in _MISSING.items() if key.endswith(end))
+        nothing = next(zeros, None)
         mine, yours = (nothing if one is None else one.value for one in entries)
         if _is_same_value(key, mine, yours, length) or _is_finer(key, mine, yours):
             continue
