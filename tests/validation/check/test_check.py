@@ -413,8 +413,11 @@ IN_CRANK_ROCKER = {
             "rev/s taken for rad/s": 0.5 / pi,
             "deg/s taken for rad/s": math.degrees(1.0),
             "rad/s taken for deg/s": radians(1.0),
+            "deg/s taken for rev/min": 6.0,
+            "rev/min taken for deg/s": 1.0 / 6.0,
         }.items()
     },
+    "omega_2 is reversed": solved(speed=-10.0),
     **{
         f"{who}{text}": bars(change, *names)
         for text, change in OF_A_BAR.items()
@@ -446,7 +449,7 @@ IN_CRANK_ROCKER = {
     "relative to bar 2": relative_to("theta_2"),
     **{
         f"omega_2 {factor} times ours": solved(speed=10.0 * factor)
-        for factor in (0.5, 6)
+        for factor in (0.5, 7)
     },
     "theta_2 counted clockwise, with all angles and torques": mirrored(1.0),
     "all angles and torques, and y reversed": mirrored((1.0, -1.0)),
@@ -476,6 +479,7 @@ MISTAKES = {
         "ground_angle is left out": solved(partial(relink, ground_angle=0.0)),
         "forces are in the frame of bar 1": in_axes(math.degrees(0.3)),
         "alpha_2 is left out": solved(acceleration=0.0),
+        "omega_2 is left out": solved(speed=0.0),
         "alpha_2 in deg/s^2 taken for": solved(acceleration=math.degrees(30.0)),
         "alpha_2 in rad/s^2 taken for": solved(acceleration=radians(30.0)),
     },

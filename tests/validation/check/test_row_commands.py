@@ -103,7 +103,8 @@ def test_a_mistake_in_the_velocity_terms_of_a_driven_rocker_is_named(read):
     right = solve(scene)
     columns = right.theta_4, -0.5 * right.omega_2, -0.5 * right.omega_3
     table = read(write("theta_4,alpha_2,alpha_3", *columns), "theta_4")
-    (first, *_) = Judgement(scene, table).explanations
+    left_out, first = Judgement(scene, table).explanations[:2]
+    assert left_out.complete and left_out.text == "omega_4 is left out"
     assert first.complete and "(dJ/dt) v is missing" in first.text
 
 

@@ -44,11 +44,11 @@ _OF_SPEEDS = {
     "in rev/min taken for rad/s": 1.0 / _RPM,
     "in rad/s taken for rev/min": _RPM,
     "in rev/s taken for rad/s": 1.0 / TURN,
+    "in deg/s taken for rev/min": 6.0,
+    "in rev/min taken for deg/s": 1.0 / 6.0,
     **_DEGREES_TAKEN,
 }
 """The same of a speed."""
-_OF_ACCELERATIONS = {"is left out": 0.0, "is reversed": -1.0, **_DEGREES_TAKEN}
-"""The same of an acceleration, with what else may be done to it."""
 _OTHER_BRANCH = "the other branch"
 _NEARLY_AT_REST = 1e-18
 """Factor on a speed of which only the sign is left."""
@@ -133,12 +133,18 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
     def change(text: str, **fields: Any) -> Mistake:
         return solve_other(text, scene, at._replace(**fields))
 
+    name, omega, alpha = at.names
     yield change(_OTHER_BRANCH, branch=-at.branch)
     if at.speed is not None:
         yield change("no inertial forces (statics)", speed=0.0, acceleration=0.0)
         slow = _NEARLY_AT_REST * at.speed
         text = "no inertial forces (statics), with friction"
         yield change(text, speed=slow, acceleration=0.0).within(FORCE_NAMES)
+        yield change(f"{omega} is reversed", speed=-at.speed)
+        if np.any(at.acceleration):
+            yield change(f"{omega} is left out", speed=slow)
+            yield change(f"{alpha} is left out", acceleration=0.0)
+            yield change(f"{alpha} is reversed", acceleration=-at.acceleration)
     if ground := scene.linkage.ground_angle:
         # a cylinder turns its bar with the ground
         turned = ground if at.moves_stroke else 0.0
@@ -147,7 +153,6 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
         yield solve_other("ground_angle is left out", level, level_at)
     if at.moves_stroke:
         return
-    name, omega, alpha = at.names
     yield change(f"{name} read as degrees", angle=np.radians(at.angle))
     # a whole turn is 6.28 of these degrees
     in_degrees = np.degrees(np.fmod(at.angle, TURN))
@@ -162,7 +167,7 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
     for words, factor in _OF_SPEEDS.items():
         yield change(f"{omega} {words.format('s')}", speed=at.speed * factor)
     if np.any(at.acceleration):
-        for words, factor in _OF_ACCELERATIONS.items():
+        for words, factor in _DEGREES_TAKEN.items():
             other = at.acceleration * factor
             yield change(f"{alpha} {words.format('s^2')}", acceleration=other)
 
