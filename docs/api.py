@@ -15,8 +15,8 @@ from fourbar.quantities import QUANTITIES, Quantities
 QUANTITY = {quantity.name: quantity for quantity in QUANTITIES}
 METHODS = {
     "Solution": (
-        *("title", "drive_bar", "origin", "status", "assembled", "evaluated"),
-        *("to_csv", "to_pandas"),
+        *("title", "drive_bar", "drive", "origin", "status", "assembled"),
+        *("evaluated", "to_csv", "to_pandas"),
     ),
     "Bar": ("moment_of_inertia",),
     "Motion": ("replace",),
@@ -75,7 +75,8 @@ def signature(thing: Any) -> str:
 
     A description has its fields as arguments.
     """
-    node = parse(thing.fget if isinstance(thing, property) else thing)
+    written = getattr(thing, "fget", None) or getattr(thing, "func", thing)
+    node = parse(written)
     if isinstance(node, ast.ClassDef):
         arguments = [
             ast.unparse(_without_declaration(statement, thing)).replace(

@@ -55,9 +55,9 @@ Description = TypeVar("Description")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(field,))
-def record(kind: Description) -> Description:
+def record(kind: type[Description]) -> type[Description]:
     """Make a class a frozen dataclass with slots."""
-    return dataclass(frozen=True, slots=True)(kind)  # type: ignore[return-value, arg-type]
+    return dataclass(frozen=True, slots=True)(kind)
 
 
 def is_within(number: Any, bound: str) -> Any:

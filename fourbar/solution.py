@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -62,7 +62,7 @@ SHOWN_PARTS = (
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Solution(Quantities):
+class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
     """The answer of the formulas at n positions, in SI units and radians.
 
     For a study it is at n positions of each of m linkages. Scalars have shape (n,),
@@ -144,6 +144,16 @@ class Solution(Quantities):
         raise InputError("solution", name, allowed)
 
     __iter__: ClassVar[None] = None  # neither positions nor names
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all fields are equal, number by number and NaN to NaN."""
+        if not isinstance(other, Solution):
+            return NotImplemented
+        return all(
+            _is_equal(getattr(self, part.name), getattr(other, part.name))
+            for part in fields(self)
+            if part.name not in ("stated", "command_at")
+        )
 
     def __repr__(self) -> str:
         """Say in three lines what it holds."""
@@ -264,6 +274,21 @@ class Solution(Quantities):
         table = make_data_frame(columns)
         table.attrs["units"] = units_of
         return table
+
+
+def _is_equal(one: Any, another: Any) -> bool:
+    """Return whether two parts of a solution are equal, arrays in them too."""
+    if isinstance(one, np.ndarray) or isinstance(another, np.ndarray):
+        has_nan = np.issubdtype(np.asarray(one).dtype, np.floating)
+        return np.array_equal(one, another, equal_nan=has_nan)
+    if isinstance(one, dict) and isinstance(another, dict):
+        if one.keys() != another.keys():
+            return False
+        another = tuple(another[name] for name in one)
+        one = tuple(one.values())
+    if isinstance(one, tuple) and isinstance(another, tuple):
+        return len(one) == len(another) and all(map(_is_equal, one, another))
+    return bool(one == another)
 
 
 def where_assembled(solution: Solution, values: Any) -> Array:

@@ -534,13 +534,17 @@ class _Run:
             begun = Case.of(self.scene).begin_with(motion.part(slice(0, 1)))
             state = begun.at(motion)
             for term in begun.terms:
-                for pin, rows in term.list_wound(state, motion.branch).items():
-                    if rows.any():
-                        assert motion.time is not None
-                        raise LimitError(
-                            f"effects.{term.key}.{pin}: at"
-                            f" {motion.time[np.argmax(rows)]:.6g} s the free motion has"
-                            f" turned {pin} by more than half a turn from the rest of"
-                            " its spring, which is not modelled: state a shorter"
-                            " motion.free.duration"
-                        )
+                codes = term.status(state, motion.branch) if term.counts_turns else None
+                if codes is None or not codes.any():
+                    continue
+                assert motion.time is not None
+                first = np.argmax(codes)
+                wound = term.list_wound(state, motion.branch)
+                pin = next((pin for pin, rows in wound.items() if rows[first]), "")
+                raise LimitError(
+                    f"effects.{term.key}{'.' * bool(pin)}{pin}: at"
+                    f" {motion.time[first]:.6g} s the free motion has turned"
+                    f" {pin or 'a pin'} by more than half a turn from the rest of its"
+                    " spring, which is not modelled: state a shorter"
+                    " motion.free.duration"
+                )

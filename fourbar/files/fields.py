@@ -167,7 +167,7 @@ class Entry:
                     break
             allowed = error.allowed
             if wrong.value == DRAWN_WORD:
-                of = "an angle or a stroke directly under [motion] alone"
+                of = "an angle, a stroke or a side directly under [motion] alone"
                 allowed += f'; "{DRAWN_WORD}" needs [pins], and stands for {of}'
             raise wrong.refuse(allowed) from None
 

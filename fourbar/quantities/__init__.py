@@ -18,9 +18,9 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 """Indices of positions, or of rows of another array."""
 Signs = NDArray[np.int8]
-"""+1 or -1, of an assembly."""
+"""Small whole numbers with a sign: assemblies (+1 or -1), bars, circuits."""
 Codes = NDArray[np.uint8]
-"""Status codes of positions."""
+"""Small codes, as the status of each position."""
 
 
 class Quantity(NamedTuple):

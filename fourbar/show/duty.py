@@ -110,7 +110,7 @@ def shaking_force(solution: Solution) -> Array:
     a_G: the force F21 + F41 = -(F12 + F14), and that of a linear drive or of springs
     with an end on the ground besides.
     """
-    return _sum_on_frame(solution)[0]
+    return _sum_on_frame(solution)[0].copy()
 
 
 def shaking_moment(solution: Solution) -> Array:
@@ -119,12 +119,19 @@ def shaking_moment(solution: Solution) -> Array:
     By the angular momentum of the bars about O2: -T - O4 x F14, and the moments of
     linear drives, springs and couples that act between bars and ground.
     """
-    return _sum_on_frame(solution)[1]
+    return _sum_on_frame(solution)[1].copy()
 
 
 def _sum_on_frame(solution: Solution) -> tuple[Array, Array]:
-    """Sum what acts on the bars from outside, and what their momentum gains."""
+    """Sum what acts on the bars from outside, and what their momentum gains.
+
+    The solution keeps both sums, of which tables ask for one after the other.
+    """
     F12 = _require_quantity(solution, "F12")
+    kept = vars(solution)
+    if "_on_frame" in kept:
+        sums: tuple[Array, Array] = kept["_on_frame"]
+        return sums
     scene = solution.stated.settled()
     bodies = list_bodies(scene.linkage, scene.effects)
     state = compute_shown_state(scene, solution.at)
@@ -149,6 +156,7 @@ def _sum_on_frame(solution: Solution) -> tuple[Array, Array]:
     moment[has_none] = np.nan
     vectors = np.stack([force.real, force.imag], axis=-1)
     vectors[has_none] = np.nan
+    kept["_on_frame"] = vectors, moment
     return vectors, moment
 
 

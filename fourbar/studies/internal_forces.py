@@ -92,8 +92,9 @@ def internal_forces(
     if solution.theta_2.ndim != 1:
         raise InputError("solution", "a study", "must be of one scene: take one member")
     beam = _collect_acting(scene, solution, bar)
-    first = np.nanmin(beam.foot, initial=0.0)
-    last = np.nanmax(beam.foot, initial=beam.length)
+    feet = beam.foot[solution.assembled]
+    first = np.nanmin(feet, initial=0.0)
+    last = np.nanmax(feet, initial=beam.length)
     x = np.linspace(first, last, _STATIONS)
     if stations is not None:
         x = np.atleast_1d(

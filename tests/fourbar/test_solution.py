@@ -55,6 +55,20 @@ def test_one_position_is_written_into_an_array():
     assert "torque" not in whole.to_pandas()
 
 
+def test_solutions_are_equal_bit_by_bit():
+    scene = pointed()
+    solution, again = solve(scene), solve(scene)
+    assert solution == again
+    assert solution != "a solution"
+    again.torque[3] = np.nextafter(again.torque[3], np.inf)
+    assert solution != again
+    solution.torque[3] = again.torque[3] = np.nan
+    assert solution == again
+    again.points["P"][0, 0] += 1e-15
+    assert solution != again
+    assert solve(scene, "velocity") != solve(scene)
+
+
 def test_a_data_frame_names_the_unit_of_each_column():
     importorskip("pandas", reason="to_pandas needs pandas: pip install pandas")
     table = solve(pointed()).to_pandas()

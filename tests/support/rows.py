@@ -24,12 +24,12 @@ def read_rows(table):
 
 
 @contextmanager
-def refused(*words):
-    """What is done here is refused, in one line with these words."""
+def refused(*words, start=""):
+    """What is done here is refused, in one line with these words and this start."""
     with raises(InputError) as caught:
         yield
     said = str(caught.value)
-    assert "\n" not in said
+    assert said.startswith(start) and "\n" not in said, said
     for word in words:
         assert word in said, said
 

@@ -40,5 +40,5 @@ def test_what_a_file_states_wrongly_is_refused_with_what_to_write(
     before, after = (text.replace(r"\n", "\n") for text in (old, new))
     text = FILES[name]
     assert before in text
-    with refused("scene.toml: ", words):
+    with refused(words, start="scene.toml: "):
         loads(text.replace(before, after, 1), "scene.toml")

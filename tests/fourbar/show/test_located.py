@@ -7,6 +7,8 @@ import numpy as np
 from pytest import approx, mark, raises
 
 from fourbar import (
+    Bar,
+    FourBar,
     Free,
     InputError,
     Law,
@@ -386,3 +388,11 @@ def test_a_pure_number_is_read_as_any_other():
         for text in ("-0.25", "\N{MINUS SIGN}0.25", "-1/4")
     )
     assert minus == approx(plain) and fraction == approx(plain)
+
+
+def test_a_zero_at_a_position_of_the_sweep_is_no_rounding():
+    """The weight of a crank has no lever at 90 deg, where its error bar exceeds it."""
+    crank = Bar(0.1, 2.0, 0.0, (0.1, 0.0))
+    linkage = FourBar(0.3, crank, Bar(0.25), Bar(0.22))
+    scene = Scene(linkage, Motion(Sweep(0.0, pi, 4), 1.0), effects=WEIGHT)
+    assert locate(scene, "torque", "0 N m").places == approx([0.5 * pi], abs=LOCATED)

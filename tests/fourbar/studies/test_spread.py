@@ -135,7 +135,7 @@ BAD = read_rows("""
 
 @mark.parametrize("line, words", BAD)
 def test_a_bad_tolerance_is_one_line(line, words):
-    with refused("s.toml: tolerances", words):
+    with refused(words, start="s.toml: tolerances"):
         loads(MODEL + "[tolerances]\n" + line, "s.toml")
 
 

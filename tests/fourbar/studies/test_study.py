@@ -237,12 +237,15 @@ def test_texts_with_units_are_the_numbers():
     for key, text, words in read_rows("""
 lengths.input | 1 deg | "deg" does not convert to m
 effects.viscous.O2 | 1 N m | does not convert to N m s/rad
-lengths.x | 1 mm | lengths.x =
 """):
         with refused(key, words):
             Tolerance(key, text)
         with refused(key, words):
             vary(case, {key: [text]})
+    with refused("lengths.x = '1 mm': unknown key"):
+        Tolerance("lengths.x", "1 mm")
+    with refused("lengths.x = ['1 mm']: is no number of this scene"):
+        vary(case, {"lengths.x": ["1 mm"]})
 
 
 def test_a_study_is_given_no_other_positions():

@@ -649,6 +649,18 @@ def test_dry_friction_holds_a_range_of_torques_at_rest(alpha, part, code, words,
     assert result == int(code) and words in out
 
 
+@mark.parametrize(
+    "share, code", [(-1.0, HOLDS), (0.0, HOLDS), (1.0, HOLDS), (0.5, FAILED)]
+)
+def test_where_a_list_turns_back_friction_acts_one_way_or_the_other(share, code, check):
+    motion = Motion([0.4, 0.8, 0.5], [2.0, 0.0, -2.0], [0.0, -9.0, 0.0])
+    scene = replace(OURS, motion=motion, effects=(Friction.at(O2=0.5),))
+    solution = solve(scene)
+    torque = solution.torque + np.array([0.0, 0.5 * share, 0.0])
+    columns = {"theta_2": solution.theta_2, "torque": torque}
+    assert check(scene, write(columns, ("torque",)))[0] == code
+
+
 @mark.parametrize("axis, name", [(0, "F12_x"), (1, "F12_y")])
 def test_the_sign_of_one_component_is_named_by_itself(axis, name, read):
     numbers = right(OURS)

@@ -189,7 +189,7 @@ command
 def test_what_is_no_entry_is_named_with_its_file(text, words, tmp_path):
     file = tmp_path / "engines.toml"
     file.write_text(text.replace(r"\n", "\n"))
-    with refused(str(file), words):
+    with refused(words, start=str(file)):
         read_engines([tmp_path])
 
 

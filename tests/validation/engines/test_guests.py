@@ -451,7 +451,7 @@ tests.support.hostile_class:Absent | AttributeError
 """),
 )
 def test_what_is_not_there_is_refused_in_one_line(entry, part):
-    with refused("--guest = ", part):
+    with refused(part, start="--guest = "):
         select_engines(Request(guest=(entry,)))
 
 

@@ -304,7 +304,8 @@ def test_what_is_none_is_refused_in_one_line(part, text):
 """),
 )
 def test_a_setting_that_is_none_is_refused_in_one_line(text):
-    with refused("setting = ", ": must be an object with name, and steps_per_turn"):
+    words = ": must be an object with name, and steps_per_turn"
+    with refused(words, start="setting = "):
         protocol.read_setting(json.loads(text))
 
 

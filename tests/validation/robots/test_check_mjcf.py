@@ -270,6 +270,7 @@ ARMATURE = "tendons.ground output.armature"
         (ARMATURE, None, 0.1, "inertia at the pin or along the tendon"),
         (SPRING, 150.0, 155.0, "a spring at the pin or along the tendon"),
         ("closure.by", "connect of sites", "tendon", "a tendon leaves out"),
+        ("closure.weight", 4.0, 8.0, "1/kg, by the masses"),
     ],
 )
 def test_a_remark_says_what_a_difference_does(key, ours, theirs, remark):

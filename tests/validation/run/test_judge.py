@@ -164,6 +164,7 @@ def test_where_dry_friction_reverses_forces_are_not_judged_and_the_motion_is():
         else:
             assert row.verdict == FAILS and not noted, quantity
             assert row.theta_2 == psi, quantity
+    assert rows["undecided"].error == 0.0
 
 
 ROCKER = uniform(0.3, 0.25, 0.1, 0.22)

@@ -128,9 +128,9 @@ def texts_shown(figure):
     return [(t.get_text(), t.get_window_extent(renderer)) for t in shown]
 
 
-def words_of(figure):
-    """All texts of a figure, in one line."""
-    return " ".join(" ".join(text.get_text() for text in figure.findobj(Text)).split())
+def caption_of(figure):
+    """What stands beneath the panels of a figure, in one line."""
+    return " ".join(figure.subfigs[0].get_supxlabel().split())
 
 
 def clashes(figure):
@@ -318,15 +318,14 @@ def test_positions_that_do_not_assemble_leave_a_gap_and_poles_cut_the_line():
     assert np.isnan(x[first + 1]) and np.isnan(y[first + 1])
     assert x[first + 2] == places[1]
     assert panel.get_ylim()[1] < np.nanmax(abs(sweep.torque))
-    assert "Torque of the drive on bar 4 clipped at" in words_of(figure)
+    assert "Torque of the drive on bar 4 clipped at" in caption_of(figure)
 
 
 def test_the_largest_of_what_is_clipped_may_be_commanded():
     """The law turns bar 2 by 1 rad in 10 ms, the others turn less."""
     law = Law((0.0, 1.0, 1.01, 3.0), (0.1, 0.2, 1.2, 1.3), omega_2=(0.0,) * 4)
     figure = composed(crank_rocker(Motion(law=law)), "kinematics")
-    words = " ".join(text.get_text() for text in figure.findobj(Text))
-    assert "the largest evaluated, ω2\xa0=" in words.replace("\n", " ")
+    assert "the largest evaluated, ω2 =" in caption_of(figure)
 
 
 def test_an_ordinary_curve_is_not_clipped():
@@ -363,7 +362,7 @@ def test_free_bodies_balance(drive):
 
 @mark.parametrize("name", ["freebody", "bars", "forces"])
 def test_a_figure_says_what_dry_friction_at_rest_leaves_the_drive(name):
-    words = words_of(draw_figure(RESTING, name).figure)
+    words = caption_of(draw_figure(RESTING, name).figure)
     assert "Dry friction at rest is taken as 0" in words
     torque = 1e3 * solve(RESTING).torque[0]
     ends = f"between {torque - 200.0:.3g} mN m and {torque + 200.0:.3g} mN m"
@@ -376,14 +375,14 @@ def test_the_inside_of_bars_is_drawn_at_the_position_that_is_stated(angle, posit
     scene = Scene(UNIFORM_PARALLELOGRAM, Motion(angle, 0.0), effects=WEIGHT)
     figure = composed(scene, "bars", position=position)
     moment = 1e3 * UNIFORM_PARALLELOGRAM.output.mass * 9.81 * 0.5 * 0.1 / 8.0
-    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in words_of(figure)
+    assert f"Bar 4: largest |M| = {moment:.3g} mN m at x = 50 mm" in caption_of(figure)
     assert all(axes.get_title("left").endswith("60°") for axes in figure.axes[:3])
 
 
 def test_the_inside_of_bars_is_drawn_beside_a_change_point_with_the_largest_moment():
     """That of bar 4 has no pin forces: m g c/8 at 0 deg."""
     motion = Motion(Sweep(0.0, tau, 12), 1.0)
-    words = words_of(
+    words = caption_of(
         composed(Scene(UNIFORM_PARALLELOGRAM, motion, effects=WEIGHT), "bars")
     )
     moment = 1e3 * UNIFORM_PARALLELOGRAM.output.mass * 9.81 * 0.1 / 8.0
