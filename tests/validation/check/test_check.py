@@ -19,6 +19,7 @@ from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar.quantities import OK, PIN_FORCES, UNITS, VECTORS
 from fourbar.scene import Scene, command, command_at
 from fourbar.scene.motion import Law
+from fourbar.show.derived import derive
 from fourbar.solving import solve
 from fourbar_validation.check.calculated import find_miscalculated
 from fourbar_validation.check.check import Judgement, list_names_of_points
@@ -362,7 +363,12 @@ LENGTHS = {"ground": 1.01, "input": 0.98, "coupler": 1.001, "output": 0.95}
 IN_THESIS = {
     "x and y exchanged": changed(lambda right: {"F32": right["F32"][:, ::-1]}),
     "other branch": solved(branch=np.full(12, -1, np.int8)),
-    "gravity along -y is included": gravity(9.81),
+    **{
+        f"gravity along -y is included though the scene has none: {size}": (
+            gravity(size)
+        )
+        for size in (9.81, 9.80665, 9.8)
+    },
     "bars.coupler.inertia left out": bars(scaled(inertia=0.0), "coupler"),
     "bars.*.inertia left out": bars(scaled(inertia=0.0)),
     "bars.output.inertia 10000 times ours": bars(scaled(inertia=1e4), "output"),
@@ -680,11 +686,25 @@ def test_rates_of_the_rows_are_named_where_the_scene_states_others(read):
     assert told.complete
 
 
+def test_shaking_takes_part_in_a_mistake(read):
+    still = solve(replace(OURS, effects=()))
+    x, y = derive(still, "shaking_force").T
+    columns = {"shaking_force_x": x, "shaking_force_y": y, "torque": still.torque}
+    table = read(tabulate({"theta_2": still.theta_2, **columns}))
+    (told,) = Judgement(OURS, table).explanations
+    assert told.text == "effects.gravity left out" and told.complete
+    assert told.quantities == ("shaking_force", "torque")
+
+
 def test_a_size_is_that_of_one_force_without_a_sign(read):
     numbers = right(OURS)
-    columns = {"theta_2": numbers["theta_2"], "F43": np.hypot(*numbers["F14"].T)}
+    size = np.hypot(*numbers["F14"].T)
+    columns = {"theta_2": numbers["theta_2"], "F43": size}
     told = Judgement(OURS, read(tabulate(columns))).explanations
     assert [one.text for one in told] == ["F43 = F14"]
+    late = read(tabulate({"theta_2": numbers["theta_2"], "F14": np.roll(size, 1)}))
+    first = Judgement(OURS, late).explanations[0]
+    assert first.text.startswith("one step late")
 
 
 @mark.parametrize("torque, code", [("0.0", HOLDS), ("0.04", FAILED)])

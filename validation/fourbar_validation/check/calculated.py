@@ -277,10 +277,12 @@ def _free_edge(
 ) -> Array | None:
     """Return the numbers of a mistake, at one row those of the table."""
     values = mistake.predict(quantity)
-    column = judge.columns.get(quantity)
+    columns = judge.columns
+    column = columns.get(quantity) or columns.get(f"|{quantity}|")
     if values is not None and column is not None:
+        theirs = column.theirs[edge]
         values = values.copy()
-        values[edge] = column.theirs[edge]
+        values[edge] = theirs if theirs.shape == values[edge].shape else (theirs, 0.0)
     return values
 
 

@@ -49,18 +49,20 @@ class Judgement(Judge):
     def explanations(self) -> list[Explanation]:
         """Return the known mistakes that explain what differs.
 
-        They are those of the quantities of a solution, or else of its motion.
+        They are those of all columns, of the quantities of a solution, or else of its
+        motion.
         """
         labels = {finding.quantity for finding in self.differing}
-        known = {k: one for k, one in self.columns.items() if one.quantity in UNITS}
-        motion = [k for k in known if STAGE_OF.get(known[k].quantity) != "force"]
-        for keys in dict.fromkeys((tuple(known), tuple(motion))):
+        every = self.columns
+        known = [k for k, one in every.items() if one.quantity in UNITS]
+        motion = [k for k in known if STAGE_OF.get(every[k].quantity) != "force"]
+        for keys in dict.fromkeys(map(tuple, (every, known, motion))):
             part = copy(self)
-            part.columns = {key: known[key] for key in keys}
-            wrong = [known[key] for key in sorted(keys) if known[key].label in labels]
+            part.columns = {key: every[key] for key in keys}
+            wrong = [every[key] for key in sorted(keys) if every[key].label in labels]
             found = explain(part, wrong) if wrong else []
             if found:
-                is_all = len(keys) == len(known)
+                is_all = len(wrong) == len(labels)
                 return [one._replace(complete=one.complete and is_all) for one in found]
         return []
 

@@ -15,15 +15,17 @@ import numpy as np
 from fourbar.effects import Friction, PinFriction
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NAMES
-from fourbar.quantities import UNITS, VECTORS, Array
+from fourbar.quantities import Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Command, Scene
+from fourbar.solution import find_unit_of_quantity
 from fourbar.studies.keys import replace_numbers
 from fourbar_validation.check.calculated import join
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.variants import (
     Mistake,
+    compute_column,
     drop_remainder,
     solve_other,
     state_all,
@@ -113,7 +115,7 @@ def _list_multiples(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
 
     As x + i y a vector, or its mirror image, has a complex factor in other axes.
     """
-    right = column.judge.right[column.quantity]
+    right: Any = compute_column(column.judge.right, column.quantity)
     stated = (np.isfinite(column.theirs).T & column.where).T
     numbers = int(np.count_nonzero(column.ours[stated]))
     for mirrored in (False, True)[: column.ours.ndim]:
@@ -158,7 +160,7 @@ def _list_ratios(
     The number is named as two units if a pair of them has that ratio.
     """
     yield "", 1.0
-    unit = UNITS[column.quantity]
+    unit = find_unit_of_quantity(column.quantity)
     announced = column.unit
     for tried in OTHER_UNITS.get(unit, ()):
         ratio = announced.factor / find_factor(unit, tried)
@@ -174,10 +176,14 @@ def _list_ratios(
 
 def _try_exchanged(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
     """Try two columns of one unit, each under the name of the other."""
-    names = dict.fromkeys(column.quantity for column in differing)
-    for one, second in combinations(names, 2):
-        if UNITS[one] == UNITS[second] and (one in VECTORS) == (second in VECTORS):
-            taken = {one: judge.right[second], second: judge.right[one]}
+    right: dict[str, Any] = {
+        column.quantity: compute_column(judge.right, column.quantity)
+        for column in differing
+    }
+    units = {name: (find_unit_of_quantity(name), right[name].shape) for name in right}
+    for one, second in combinations(right, 2):
+        if units[one] == units[second]:
+            taken = {one: right[second], second: right[one]}
             text = f"{one} and {second} are exchanged"
             yield Mistake(text, taken.get, whole=False)
 
@@ -227,7 +233,9 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     columns = [column for column in differing if column.size.any()]
     if not columns:
         return
-    right = _compute_residual(columns, Mistake("", judge.right.__getitem__)).ravel()
+    right = _compute_residual(
+        columns, Mistake("", partial(compute_column, judge.right))
+    ).ravel()
     allowed = [
         np.full_like(column.theirs.T, column.judged_right[1]).T for column in columns
     ]

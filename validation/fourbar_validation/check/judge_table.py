@@ -22,11 +22,8 @@ from fourbar.quantities import (
     SPRING_NAME,
     UNITS,
     Array,
-    find_derived,
 )
 from fourbar.scene import Scene
-from fourbar.show.acting import list_springs
-from fourbar.show.derived import derive
 from fourbar.show.driving import begin_to_move, find_senses, leaves_range
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -35,7 +32,7 @@ from fourbar_validation.check.row_commands import (
     find_row_commands,
 )
 from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, name_quantity
-from fourbar_validation.check.variants import Predict, open_tables
+from fourbar_validation.check.variants import Predict, compute_column, open_tables
 from fourbar_validation.compare.scales import Scale, TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -125,23 +122,6 @@ def find_made_of(name: str, scene: Scene) -> str:
     point = name.removeprefix(start)
     bar = next(each.bar for each in scene.points if each.name == point)
     return f"{start}G{bar}" if bar in MOVING_BARS else f"{start}A"
-
-
-def compute_column(solution: Solution, name: str) -> Array | None:
-    """Compute a column from O2, (n,) or (n, 2); None if its stage was not evaluated."""
-    values: Array | None
-    if name in UNITS:
-        values = getattr(solution, name)
-        return values
-    if find_derived(name) is None:
-        of_stage = {"v_": solution.velocity, "a_": solution.acceleration}
-        stage = of_stage.get(name[:2], solution.points)
-        return stage.get(name[2:] if name[:2] in of_stage else name)
-    of_spring = SPRING_NAME.fullmatch(name)
-    if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
-        raise InputError("header", name, "does not exist in this scene")
-    values = derive(solution, name)
-    return values
 
 
 class JudgedColumn:

@@ -27,6 +27,7 @@ from fourbar_validation.check.fitted import (
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import (
     Mistake,
+    compute_column,
     drop_remainder,
     solve_other,
     state_all,
@@ -121,7 +122,7 @@ def _change_column(
     kinds: str | tuple[str, ...],
     quantity: str,
 ) -> Array | None:
-    values = getattr(right, quantity, None)
+    values = compute_column(right, quantity)
     if values is None or not quantity.startswith(kinds):
         return None
     return change(values)

@@ -13,18 +13,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects import Gravity, Table
-from fourbar.errors import FourBarError
-from fourbar.quantities import COUPLE, LINE, UNITS, VECTORS, Array
+from fourbar.errors import FourBarError, InputError
+from fourbar.quantities import (
+    COUPLE,
+    LINE,
+    SPRING_NAME,
+    UNITS,
+    Array,
+    find_derived,
+)
 from fourbar.scene import Command, Scene, StrokeOrigin
-from fourbar.solution import Solution
+from fourbar.show.acting import list_springs
+from fourbar.show.derived import derive
+from fourbar.solution import Solution, find_unit_of_quantity
 from fourbar.solving import solve
 from fourbar_validation.scenes.bars import list_moving, replace_bars
 
 Predict = Callable[[str], Array | None]
 """Function of a quantity that returns the numbers of a mistake; None: it has none."""
 
-_COMPUTED = UNITS.keys() - {*COUPLE[1:], *LINE[1:]}
-"""Quantities that a wrong problem changes: an error and a range are the formulas'."""
+_OF_FORMULAS = (*COUPLE[1:], *LINE[1:])
+"""Quantities that no wrong problem changes: an error and a range are the formulas'."""
 _TURNING = ("rad", "rad/s", "rad/s^2", "N m")
 """Units of what is reversed where angles are counted clockwise."""
 
@@ -70,11 +79,28 @@ class Mistake(NamedTuple):
             values = self.predict(quantity)
             if values is None:
                 return None
-            if quantity in VECTORS:
+            if values.ndim == 2:
                 return np.asarray(values * (1.0, y))
-            return -values if UNITS[quantity] in _TURNING else values
+            return -values if find_unit_of_quantity(quantity) in _TURNING else values
 
         return self._replace(predict=predict)
+
+
+def compute_column(solution: Solution, name: str) -> Array | None:
+    """Compute a column from O2, (n,) or (n, 2); None if its stage was not evaluated."""
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+        return values
+    if find_derived(name) is None:
+        of_stage = {"v_": solution.velocity, "a_": solution.acceleration}
+        stage = of_stage.get(name[:2], solution.points)
+        return stage.get(name[2:] if name[:2] in of_stage else name)
+    of_spring = SPRING_NAME.fullmatch(name)
+    if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
+        raise InputError("header", name, "does not exist in this scene")
+    values = derive(solution, name)
+    return values
 
 
 def solve_other(text: str, scene: Scene, at: Command, times: float = 1.0) -> Mistake:
@@ -91,9 +117,10 @@ def solve_other(text: str, scene: Scene, at: Command, times: float = 1.0) -> Mis
             return None
 
     def predict(quantity: str) -> Array | None:
-        if quantity == at.commanded or quantity not in _COMPUTED:
+        solution = solved()
+        if solution is None or quantity in (at.commanded, *_OF_FORMULAS):
             return None
-        return getattr(solved(), quantity, None)
+        return compute_column(solution, quantity)
 
     return Mistake(text, predict, times=times)
 

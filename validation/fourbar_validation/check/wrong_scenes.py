@@ -37,6 +37,8 @@ _INERTIAL = {
     f"inertial forces with the wrong sign {_D_ALEMBERT}": (-1.0, -1.0),
 }
 """Factors on m a and I alpha of every bar, by the mistake behind them."""
+_GRAVITIES = (9.81, 9.80665, 9.8)
+"""Gravity of textbooks and of simulators, m/s^2."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
 
@@ -109,8 +111,10 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
             numbers[f"bars.{name}.inertia"] = by_inertia * bar.moment_of_inertia
         yield text, numbers
     if not gravity.magnitude:
-        along_y = {"effects.gravity.0": 9.81, "effects.gravity.1": -math.pi / 2.0}
-        yield "gravity along -y is included though the scene has none", along_y
+        text = "gravity along -y is included though the scene has none"
+        for size in _GRAVITIES:
+            along_y = {"effects.gravity.0": size, "effects.gravity.1": -math.pi / 2.0}
+            yield f"{text}: {size} m/s^2", along_y
     with_ground = gravity.angle + scene.linkage.ground_angle
     yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
     yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
