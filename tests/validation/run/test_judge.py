@@ -9,6 +9,7 @@ import numpy as np
 from pytest import mark
 
 from fourbar import Bar, FourBar, Friction, Motion, limit_positions, solve, uniform
+from fourbar.errors import LimitError
 from fourbar.quantities import FORCE_NAMES, SINGULAR
 from fourbar.scene import Scene, command, with_signs
 from fourbar_lab.fault_scenes import FAULT_SCENES
@@ -17,10 +18,12 @@ from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import (
     AGREES,
     FAILS,
+    FORMULAS,
     REFUSES,
     UNDECIDED,
     Counts,
     Row,
+    make_breakdown,
 )
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, ErrorBound
 from fourbar_validation.engines.free_body import FreeBody
@@ -96,6 +99,16 @@ def test_a_refusal_or_a_breakdown_is_one_row():
         ((quantity, row),) = rows_of(spoil).items()
         assert (quantity, row.verdict, row.passed) == ("all", verdict, False)
         assert row.reason.startswith(reason)
+
+
+def test_a_limit_is_a_refusal_of_what_answers_and_none_of_a_check():
+    limit = LimitError("a declared limit")
+    for engine, setting, verdict in (
+        ("echo", "MJCF as shipped", REFUSES),
+        (FORMULAS, "", REFUSES),
+        (FORMULAS, "check_transformed", FAILS),
+    ):
+        assert make_breakdown("s", engine, limit, setting).verdict == verdict
 
 
 def test_angles_close_the_loop_to_what_their_engine_declares():

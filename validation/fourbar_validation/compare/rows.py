@@ -179,12 +179,13 @@ def make_breakdown(
     """Return the row of an engine that broke down.
 
     An engine breaks down if it raises, takes its process with it, or never comes back.
-    A declared limit that it raises is no breakdown: it refuses.
+    A declared limit that it raises is no breakdown: it refuses. A check of the formulas
+    has no limit.
 
     `setting`: of the row; names what it broke down in, where it is no answer.
     """
     verdict = FAILS
-    if isinstance(error, LimitError):
+    if isinstance(error, LimitError) and (engine != FORMULAS or not setting):
         verdict = REFUSES
         reason = str(error)
     elif isinstance(error, TimeoutError):
