@@ -261,11 +261,12 @@ def test_assembles_up_to_a_limit_and_not_beyond(name, offset, branch):
 @mark.parametrize("commanded", ["theta_2", "theta_3", "theta_4"])
 def test_newtons_steps_close_a_loop_whose_start_is_off(name, commanded, monkeypatch):
     """And leave one that cannot close open."""
-    start = free_body_closure.compute_angle_between
-    for module in (loop, free_body_closure):
-        monkeypatch.setattr(
-            module, "compute_angle_between", lambda *sides: start(*sides) + 0.02
-        )
+    for module, start in (
+        (loop, "_compute_triangle_angle"),
+        (free_body_closure, "_compute_angle_between"),
+    ):
+        right = getattr(module, start)
+        monkeypatch.setattr(module, start, lambda *sides, f=right: f(*sides) + 0.02)
     motion = Motion(**{commanded: np.linspace(0.05, 6.25, 40)})
     answer = answered(name, Scene(TRIPLE_ROCKER, motion))
     right = solve(Scene(TRIPLE_ROCKER, motion), "position")

@@ -5,7 +5,7 @@ The row states the position where the quantity is worst.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -159,6 +159,10 @@ class Comparison:
     """Second derivation at the same positions; by default the answer itself. The
     stricter of its condition and that of the formulas sets the allowed error; its scale
     stands in for that of an answer which has too few quantities for one.
+    """
+    scales: dict[str, tuple[Scale, Array]] = field(default_factory=dict)
+    """Scales of `formulas`, conditions of it and `reference`, by quantity, kept from
+    earlier answers that were compared with both.
     """
 
     def rows(self) -> list[Row]:
@@ -386,14 +390,16 @@ class Comparison:
         Of formulas and another derivation the stricter one counts: the larger
         condition, and the pair of size and N that allows less.
         """
-        link = self.scene.linkage
-        condition = find_condition(quantity, link, self.formulas)
-        reference = self._solution if self.reference is None else self.reference
-        if reference is not None:
-            theirs = find_condition(quantity, link, reference)
-            condition = np.fmin(np.fmax(condition, theirs), 1.0)
         sizes, answered = self._sizes
-        scale = sizes.scale(quantity, ours)
+        if quantity not in self.scales:
+            link = self.scene.linkage
+            condition = find_condition(quantity, link, self.formulas)
+            reference = self._solution if self.reference is None else self.reference
+            if reference is not None:
+                theirs = find_condition(quantity, link, reference)
+                condition = np.fmin(np.fmax(condition, theirs), 1.0)
+            self.scales[quantity] = sizes.scale(quantity, ours), condition
+        scale, condition = self.scales[quantity]
         if answered is not None:
             values = getattr(answered.solution, quantity)
             if values is not None:

@@ -73,8 +73,8 @@ def close(
     e = np.maximum(e, closed / 4.0)
     start = np.array(
         [
-            phi + branch * compute_angle_between(e, b, c),
-            phi + np.pi - branch * compute_angle_between(e, c, b),
+            phi + branch * _compute_angle_between(e, b, c),
+            phi + np.pi - branch * _compute_angle_between(e, c, b),
         ]
     )
     angles = np.full((2, len(e)), np.nan)
@@ -96,7 +96,7 @@ def close(
     return Closed(assembled, np.angle(np.exp(1j * angles)), gap, start)
 
 
-def compute_angle_between(e: Array | float, near: float, far: float) -> Array:
+def _compute_angle_between(e: Array, near: float, far: float) -> Array:
     """Compute the angle between the sides e and near, by half-angle tangents.
 
     Bars 3 and 4 are never collinear: the corner between them is at least so far off the

