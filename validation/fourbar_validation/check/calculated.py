@@ -5,7 +5,7 @@ drive follow from these by the equations of the free bodies, which are solved fo
 mistakes at once.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.effects import Flywheel
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
-from fourbar_validation.check.judge_table import Judge
+from fourbar_validation.check.judge_table import Judge, JudgedColumn
 from fourbar_validation.check.variants import Mistake, drop_remainder, solve_other
 from fourbar_validation.compare.bodies import BodyMotion, pose, stack_components
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
@@ -276,13 +276,25 @@ def _free_edge(
     judge: Judge, mistake: Mistake, edge: int, quantity: str
 ) -> Array | None:
     """Return the numbers of a mistake, at one row those of the table."""
-    values = mistake.predict(quantity)
+    return take_theirs(judge, mistake.predict(quantity), quantity, lambda _: [edge])
+
+
+def take_theirs(
+    judge: Judge,
+    values: Array | None,
+    quantity: str,
+    find_rows: Callable[[JudgedColumn], Any],
+) -> Array | None:
+    """Return numbers of a quantity, at some rows of its column those of the table."""
     columns = judge.columns
     column = columns.get(quantity) or columns.get(f"|{quantity}|")
-    if values is not None and column is not None:
-        theirs = column.theirs[edge]
-        values = values.copy()
-        values[edge] = theirs if theirs.shape == values[edge].shape else (theirs, 0.0)
+    if values is None or column is None:
+        return values
+    theirs = column.theirs
+    if theirs.ndim < values.ndim:  # any vector of that size
+        theirs = np.stack((theirs, np.zeros_like(theirs)), axis=1)
+    values, rows = values.copy(), find_rows(column)
+    values[rows] = np.where(np.isnan(theirs), values, theirs)[rows]
     return values
 
 

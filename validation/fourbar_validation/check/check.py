@@ -127,11 +127,18 @@ class Judgement(Judge):
 
     @cached_property
     def not_compared(self) -> list[str]:
-        """Names of the lines and quantities of which no number has a digit."""
+        """Names of the lines and quantities of which no number has a digit.
+
+        A line whose right numbers have none, as at a change point, is not among them.
+        """
         compared = dict[str, bool]()
         for finding in self.findings:
-            for name in (f"line {finding.line}", finding.quantity):
-                compared[name] = compared.get(name, False) or finding.judged
+            hopeless = math.isinf(finding.allowed)
+            for name, is_compared in (
+                (f"line {finding.line}", finding.judged or hopeless),
+                (finding.quantity, finding.judged),
+            ):
+                compared[name] = compared.get(name, False) or is_compared
         return [name for name, is_compared in compared.items() if not is_compared]
 
     @property

@@ -16,7 +16,7 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array
 from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
-from fourbar_validation.check.calculated import find_miscalculated
+from fourbar_validation.check.calculated import find_miscalculated, take_theirs
 from fourbar_validation.check.fitted import (
     ENOUGH_DIGITS,
     ENOUGH_NUMBERS,
@@ -25,6 +25,7 @@ from fourbar_validation.check.fitted import (
     find_fitted,
 )
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
+from fourbar_validation.check.row_commands import RowCommands, command_rates_beside
 from fourbar_validation.check.variants import (
     Mistake,
     compute_column,
@@ -111,9 +112,25 @@ def list_rates_of_rows(
         text = "each row has its own speed"
         if judge.scene.motion.law is None:
             text += f": leave {omega} and {alpha} out of the scene"
-        yield solve_other(
-            text, judge.scene, drop_remainder(judge.at)._replace(**stated)
+        near = tuple(one._replace(**stated) for one in (judge.at, *judge.rows.near))
+        rows = RowCommands(near[0])
+        table = replace(judge.stated, is_rounded=True)
+        for field in stated:
+            half = table.find_half(table.columns[fields[field]])
+            near = command_rates_beside(near, field, half)
+        logged = Judge(
+            judge.scene,
+            table,
+            judge.tolerance,
+            rows._replace(near=near),
+            judge.slack,
         )
+
+        def predict(quantity: str) -> Array | None:
+            values = compute_column(logged.right, quantity)
+            return take_theirs(logged, values, quantity, lambda column: ~column.wrong)
+
+        yield Mistake(text, predict)
 
 
 def _change_column(

@@ -136,12 +136,12 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     near = found.near or (found.at,)
     for field in stated:
         half = table.find_half(table.columns[rates[field == "acceleration"]])
-        near = _command_rates_beside(near, field, half)
+        near = command_rates_beside(near, field, half)
     near = tuple(at for at in near if at is not found.at)
     return found._replace(near=near, rates=rates)
 
 
-def _command_rates_beside(
+def command_rates_beside(
     near: tuple[Command, ...], field: str, half: Array
 ) -> tuple[Command, ...]:
     """Command the rows at both ends of the rounding of a speed or acceleration."""
