@@ -120,16 +120,18 @@ def _measure_period(
     alpha: Array,
 ) -> float | None:
     """Return the period between upward passages through mid-swing, s, or None."""
-    from scipy.interpolate import BPoly, PPoly
+    from scipy.interpolate import BPoly
+    from scipy.optimize import brentq
 
-    states = np.column_stack([theta, omega, alpha])
-    curve = PPoly.from_bernstein_basis(BPoly.from_derivatives(time, states))
     level = 0.5 * (theta.max() + theta.min())
-    passages = curve.solve(level, extrapolate=False)
-    upward = passages[curve(passages, 1) > 0.0]
-    if len(upward) < 2:
+    passed = np.flatnonzero((theta[:-1] < level) & (theta[1:] >= level))
+    if len(passed) < 2:
         return None
-    return float(np.ptp(upward)) / (len(upward) - 1)
+    curve = BPoly.from_derivatives(time, np.column_stack([theta - level, omega, alpha]))
+    first, last = (
+        brentq(curve, *time[i : i + 2], xtol=1e-300) for i in passed[[0, -1]]
+    )
+    return float(last - first) / (len(passed) - 1)
 
 
 @click.command()

@@ -19,7 +19,12 @@ from scipy import integrate, special
 import fourbar
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command
-from fourbar_lab.simulators.problems import PROBLEMS, collect_problem, list_problems
+from fourbar_lab.simulators.problems import (
+    PROBLEMS,
+    _measure_period,
+    collect_problem,
+    list_problems,
+)
 from fourbar_validation.check.problem import (
     LEVELS,
     PROBLEM_SCHEMA,
@@ -221,6 +226,14 @@ def test_gazebos_four_bar_swings_as_a_pendulum():
     omega = -2.0 * modulus * rate * cn
     forces = solve_pin_forces(problem, theta, omega)
     assert_agreement("gz_physics_987", {"theta_2": theta, "omega_2": omega} | forces)
+
+
+@mark.parametrize("samples", [60, 61])
+def test_a_period_lies_between_passages_at_samples_or_between_them(samples):
+    time = np.linspace(-0.5, 2.5, samples + 1)
+    turn = 2.0 * pi * time
+    rates = 2.0 * pi * np.cos(turn), -4.0 * pi**2 * np.sin(turn)
+    assert isclose(_measure_period(time, np.sin(turn), *rates), 1.0, rel_tol=1e-9)
 
 
 def test_a02_passes_every_angle_when_energy_says():
