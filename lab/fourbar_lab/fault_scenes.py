@@ -136,6 +136,7 @@ _WRITTEN_SCENES: dict[str, Scene | Path] = {
         Gravity(),
         linkage=ROCKER_CRANK_LINKAGE,
     ),
+    "positions": _move(Motion(Sweep(0.0, 6.0, 12))),
     "several solutions": _move(
         Motion(np.array([2.3, 2.5]), 10.0), PinFriction.at(A=(50.0, 0.01))
     ),
