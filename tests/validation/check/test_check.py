@@ -820,6 +820,11 @@ def test_a_bad_table_is_one_line(text, words, check):
     assert len(error.splitlines()) == 1 and "\x1b" not in error
 
 
+def test_a_stroke_from_another_zero_is_refused_by_its_line(check):
+    code, _, error = check(STROKE, "stroke [m],torque\n0.1,1\n0,1\n")
+    assert code == BAD_INPUT and "theirs.csv: line 3, stroke" in error
+
+
 def test_positions_that_do_not_assemble_are_named_by_their_line(read, check):
     """A right number beside them makes no success of the table."""
     assert check(THESIS, "theta_2,torque\n\n0.8,1\n")[0] == FAILED
@@ -1063,6 +1068,8 @@ def with_comma(theta, torque):
     [
         ("# made by hand\ntheta_2 [deg],torque",),
         ("# run 7\n# theta_2 [deg], torque [N m]",),
+        ("Motion study 1\n,\ntheta_2 [deg],torque [N m]",),
+        ("Study 1;\nKurbelwinkel [deg];Drehmoment [N m]", with_comma),
         ("theta_2 [deg];torque [uN m]", in_thousands),
         ("Kurbelwinkel [deg];Drehmoment [N m]", "{theta:.0f};{torque:.9f}"),
         ("Kurbelwinkel [deg];Drehmoment [N m]", with_comma),

@@ -170,6 +170,10 @@ def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands
             return RowCommands(base)
         why = "a table at other positions than the scene's own needs a column stroke"
         raise InputError("motion.stroke", None, why)
+    row = int(np.argmin(table.places))
+    if table.places[row] <= 0.0:
+        allowed = "must be above 0: it is the distance of the cylinder's pins"
+        raise InputError(f"line {table.lines[row]}, stroke", table.places[row], allowed)
 
     def command_at(shift: Array | float) -> Command:
         motion = scene.motion.replace(angle=table.places + shift)

@@ -430,7 +430,7 @@ def _read_lines(
     text: str, name: str
 ) -> tuple[list[str], list[str], list[tuple[int, list[str]]]]:
     """Read the headings, the units under them, and rows with their line numbers."""
-    text = _remove_comments(text)
+    text = _remove_titles(_remove_comments(text))
     header = next((line for line in text.splitlines() if line.strip()), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
     try:
@@ -469,6 +469,14 @@ def _remove_comments(text: str) -> str:
         header = i == first - 1 and not has_header
         lines[i] = line.lstrip().lstrip("#%/ ") if header else ""
     return "\n".join(lines) + "\n"
+
+
+def _remove_titles(text: str) -> str:
+    """Blank the lines of one cell above the first line of several."""
+    lines = text.splitlines()
+    cells = ([*filter(str.strip, re.split("[,;\t]", line))] for line in lines)
+    first = next((i for i, line in enumerate(cells) if len(line) > 1), 0)
+    return "\n".join([*[""] * first, *lines[first:]]) + "\n"
 
 
 def _read_comma(cell: str) -> str:
