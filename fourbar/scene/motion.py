@@ -263,6 +263,10 @@ class Law(Described, _OverTime):
             rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
             curve = _fit_rates(self.time, self.angle, *rates)
         theta, omega, alpha = (np.asarray(curve(time, order)) for order in range(3))
+        if self.omega is not None or self.ends == "rest":
+            # a polynomial rounds where it ends, which must not move what rests there
+            last = 0.0 if self.omega is None else self.omega[-1]
+            omega = np.where(time == t[-1], last, omega)
         return theta + mean * (time - t[0]), omega + mean, alpha
 
 
@@ -397,7 +401,11 @@ class Sine(Described, _OverTime):
         """Compute angle, speed and acceleration of the law's bar, each (n,)."""
         phase = self.frequency * require_numbers("time", time) + self.phase
         swing = self.amplitude * np.sin(phase)
-        omega = self.amplitude * self.frequency * np.cos(phase)
+        cosine = np.cos(phase)
+        # what turns back there is at rest, and does not move by the phase's rounding
+        rounding = 2.0 * np.finfo(float).eps * np.maximum(1.0, np.abs(phase))
+        cosine = np.where(np.abs(cosine) <= rounding, 0.0, cosine)
+        omega = self.amplitude * self.frequency * cosine
         return self.mean + swing, omega, -(self.frequency**2) * swing
 
 

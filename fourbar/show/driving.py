@@ -13,6 +13,8 @@ _SAME_RATE = 1e-9
 """Difference of two rates of a spline that is round-off, over its largest value. The
 rounding is that of its coefficients.
 """
+_BESIDE = 1e-6
+"""Part of a law's time from an instant at rest to where it is told how it moves."""
 _BEGINNING = 1e-100
 """Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
 its sign.
@@ -83,6 +85,15 @@ def find_senses(solution: Solution) -> Array:
     starts = np.where(at_rest, np.sign(growth), 0.0)
     moves = np.sign(speed) * np.ones(len(starts)) if at_rest.any() else starts
     before, after = np.append(0.0, moves[:-1]), np.append(moves[1:], 0.0)
+    law = solution.stated.motion.law
+    if law is not None and solution.time is not None and at_rest.any():
+        # it moves beside a single instant too
+        first, last = law.time[0], law.time[-1]
+        away = _BESIDE * (last - first)
+        before, after = (
+            np.sign(law.at(np.clip(solution.at.places + aside, first, last))[1])
+            for aside in (-away, away)
+        )
     stops = np.where(before == -starts, before, starts)
     return np.stack([np.where(after == starts, starts, stops), stops])
 

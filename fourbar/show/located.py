@@ -94,7 +94,9 @@ class _LocatedSearch:
             self.unit = f"({column.unit})/({column.divisor})"
         self.places = self.course.places
         self.values = where_assembled(self.course.solution, column.values)
-        if stage == "error" and bar in UNITS:  # rounding beside a vanishing lever
+        known = np.isfinite(self.values).any()
+        if stage == "error" and bar in UNITS and known:
+            # rounding beside a vanishing lever
             sizes = np.abs(self.values)
             most = TOLD * np.fmax(sizes, np.nanmedian(sizes))
             self.values[self.course.solution[bar] > most] = np.nan

@@ -234,18 +234,17 @@ class Facts:
         places = solution.at.places.tolist()
         law = self.scene.motion.law
         times = np.array([] if law is None else law.time)
-        beside = [-math.inf, *places, math.inf]
+        rests = times if law is None else times[law.at(times)[1] == 0.0]
+        beside = [places[0], *places, places[-1]]
         ranges = list[HeldRange]()
         for run in split_runs(rows):
             is_end = run[0] == len(solution) - 1 and rows[0] == 0
             if self.kind == "turn" and ranges and is_end:
                 continue
             ends = places[run[0]], places[run[-1]]
-            if len(run) > 1:  # a dwell lasts from one of a law's times to another
-                before, after = beside[run[0]], beside[run[-1] + 2]
-                starts = times[(before <= times) & (times <= ends[0])]
-                stops = times[(ends[1] <= times) & (times <= after)]
-                ends = max([*starts], default=ends[0]), min([*stops], default=ends[1])
+            # a dwell lasts from one of a law's times to another
+            beyond = (beside[run[0]] <= rests) & (rests <= beside[run[-1] + 2])
+            ends = min([ends[0], *rests[beyond]]), max([ends[1], *rests[beyond]])
             ranges.append(HeldRange.of(ends, bounds[:, run]))
         return ranges
 

@@ -51,6 +51,19 @@ def test_a_sine_is_followed_to_all_digits():
     assert s.theta_2[100] == approx(1.0 + sin(0.5 * s.time[100]))
 
 
+@mark.parametrize(
+    "law, at",
+    [
+        (Law((-0.1, 0.2, 0.5), (0.2, 0.9, 1.3), ends="rest"), (-0.1, 0.5)),
+        (Law((0.0, 0.3, 0.7), (0.2, 0.9, 1.3), omega_2=(0.0, 2.0, 0.0)), (0.0, 0.7)),
+        (Sine(1.0, 0.5, tau, 0.75, 0.5 * pi), (0.0, 0.5)),
+    ],
+)
+def test_what_rests_or_turns_back_at_an_instant_has_no_speed_there(law, at):
+    """Dry friction would take the sign of its rounding."""
+    assert not law.at(np.array(at))[1].any()
+
+
 @mark.parametrize("bar", MOVING_BARS)
 @mark.parametrize("rates", [0, 1, 2])
 def test_a_polynomial_comes_back_from_its_points_and_rates(rates, bar):

@@ -621,6 +621,10 @@ def test_a_law_that_starts_and_stops_bears_what_stands_beside_these_instants():
     alone = Motion(1.2, 0.0, float(first.alpha_2[0]))
     starts = Facts(solve(crank_rocker(alone, effects=effects))).motion.start
     assert Facts(first).motion.start.value == approx(starts.value, rel=1e-12)
+    last = Facts(solve(scene, at=command_at(scene, np.array([0.65])))).motion
+    assert last.start is None  # it stops there
+    (way,) = last.started
+    assert way.solution.torque[0] == approx(inside.torque[-1], rel=1e-6)
 
 
 CORNERS = tuple(np.radians((0.0, 95.0, 101.3, 107.0, 360.0)))

@@ -287,6 +287,12 @@ def test_a_column_that_jumps_over_a_value_does_not_have_it():
         locate(scene, "torque", "0.5 N m")
 
 
+def test_a_motion_without_any_value_is_refused_without_a_warning():
+    open_loop = Scene(bare(0.6, 0.3, 0.35, 0.25), Motion(Sweep(2.0, 2.5, 9), 1.0))
+    with raises(NotAssembledError):
+        locate(open_loop, "torque", "max")
+
+
 def test_a_column_without_a_value_at_its_pole_jumps_there():
     """At its dead point a force of constant power has no value, nor the other sign."""
     drive = PointDrive(Place(3, (0.1, 0.2)), 0.5, "bar")
