@@ -51,7 +51,7 @@ EFFECTS |= {
     ),
 }
 """Effects by name, each alone on the same linkage: as in the example of a scene file,
-but for those that act at several pins or beside the closure.
+unless it is written here.
 """
 SIMULATION = "mujoco-simulated"
 NO_COUNTERPART = {

@@ -202,29 +202,30 @@ def examine_scenes(
 def fuzz(scenes: int, seed: int, workers: int) -> int:
     """Put random scenes through files, formulas and exact engines.
 
-    Every failure is shrunk and kept.
+    The first failures are shrunk and kept, each as soon as it is found.
     """
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
-    wrong: dict[int, list[str]] = {}
+    wrong = 0
     tasks = -(-scenes // SCENES_OF_A_TASK)
     running = examine_scenes(scenes, seed, workers)
     for task in track(running, "fuzzing", total=tasks, console=console):
-        wrong |= task
-    for number in sorted(wrong)[:FAILURES_PRINTED]:
-        source = wrong[number][0]
-        scene = draw_fuzz_scene(seed, number)
-        if not source.startswith(WORKER_LOST):  # shrinking would end this process too
-            scene = shrink_scene(scene, lambda smaller: bool(list_findings(smaller)))
-            source = list_findings(scene)[0]
-        title = f"found by fuzzing, seed {seed}, scene {number}"
-        path = keep_counterexample(
-            replace(scene, title=title, source=source), f"seed_{seed}_scene_{number}"
-        )
-        console.print(f"scene {number}: {wrong[number][0]}\n  kept as {path.name}")
-    print(
-        f"{len(wrong)} of {scenes} scenes fail (seed {seed}, half of them adversarial)"
-    )
+        for number, (finding, *_) in task.items():
+            wrong += 1
+            if wrong <= FAILURES_PRINTED:
+                path = _shrink_and_keep(seed, number, finding)
+                console.print(f"scene {number}: {finding}\n  kept as {path.name}")
+    print(f"{wrong} of {scenes} scenes fail (seed {seed}, half of them adversarial)")
     return 1 if wrong else 0
+
+
+def _shrink_and_keep(seed: int, number: int, finding: str) -> Path:
+    scene = draw_fuzz_scene(seed, number)
+    if not finding.startswith(WORKER_LOST):  # shrinking would end this process too
+        scene = shrink_scene(scene, lambda smaller: bool(list_findings(smaller)))
+        finding = list_findings(scene)[0]
+    title = f"found by fuzzing, seed {seed}, scene {number}"
+    scene = replace(scene, title=title, source=finding)
+    return keep_counterexample(scene, f"seed_{seed}_scene_{number}")

@@ -8,6 +8,7 @@ from importlib import import_module
 from unittest.mock import Mock
 
 import numpy as np
+from click.testing import CliRunner
 from pytest import mark
 
 from fourbar import Motion, Scene, uniform
@@ -68,6 +69,18 @@ def test_a_traceback_is_a_finding_and_so_is_a_file_of_another_scene(monkeypatch)
     assert finding.startswith("file: ")
     monkeypatch.setattr(examine, "judge", Mock(side_effect=ZeroDivisionError("oops")))
     assert examine.list_findings(crank_rocker()) == ["ZeroDivisionError: oops"]
+
+
+def test_a_run_that_is_broken_off_keeps_what_it_found(monkeypatch):
+    def break_off(*_):
+        yield {4: [f"{examine.WORKER_LOST} killed"]}
+        raise KeyboardInterrupt
+
+    kept = Mock()
+    monkeypatch.setattr(examine, "examine_scenes", break_off)
+    monkeypatch.setattr(examine, "keep_counterexample", kept)
+    CliRunner().invoke(examine.fuzz)
+    assert kept.call_args.args[1] == "seed_0_scene_4"
 
 
 def test_a_position_that_does_not_close_is_a_finding(monkeypatch):

@@ -133,7 +133,7 @@ def test_formulas_are_right_to_round_off(tmp_path):
     (point_of_formulas,) = made._time_formulas()
     assert point_of_formulas.errors.worst < 1e-13
     made.scene = replace(made.scene, effects=(fourbar.PinFriction.at(A=(0.2, 0.02)),))
-    with raises(LimitError, match="pin_friction"):
+    with raises(LimitError, match="ball arithmetic: the effect 'pin_friction"):
         next(made._time_formulas())
 
 

@@ -163,7 +163,7 @@ class CostStudy:
                     points: list[dict[str, Any]] = []
                     try:
                         points += map(asdict, unit())
-                    except (FourBarError, NotImplementedError) as error:
+                    except FourBarError as error:
                         points = []
                         self.left_out.append(f"{name}: {error}")
                     store.put(number, [points, self.left_out[known:]])
@@ -297,7 +297,7 @@ class CostStudy:
         few = choose_few(command)
         reference = ask_at(BALLS.start(), scene, few)
         if reference.refusal:
-            raise LimitError(reference.refusal)
+            raise LimitError(f"ball arithmetic: {reference.refusal}")
         errors = compute_errors(scene, few, reference.quantities)
         action = partial(solve, scene, "force", at=command)
         n = len(command.theta_2)
