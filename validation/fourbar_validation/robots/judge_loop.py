@@ -68,8 +68,8 @@ _SOFTNESS = "fourbar_validation.engines.mujoco.robots.measure:predict_softness"
 _NOTHING = 1e-9
 """Cost below which a difference is one of the digits of a scene, which has twelve."""
 _MOST_ALLOWED = 0.1
-"""Part of the largest value of a quantity beyond which a file is wrong, whatever
-MuJoCo's stiffest constraint leaves in it.
+"""Part of the largest torque or force, of a radian, or of the commanded speed, beyond
+which a file is wrong, whatever MuJoCo's stiffest constraint leaves in it.
 """
 _BY_STIFFEST = (
     "as what MuJoCo's stiffest constraint (solimp 0.9999) and the rounding of lengths"
@@ -275,13 +275,11 @@ def judge_answers(
     for answer in answers:
         formulas = solve(scene, "force", at=answer.at)
 
-        def predicted(
-            quantity: str, mask: Mask, formulas: Solution = formulas
-        ) -> Array:
+        def predicted(quantity: str, _: Mask, formulas: Solution = formulas) -> Array:
             left = (softness or {}).get(_name_force(scene, quantity), 0.0)
-            of_formulas = measure_sizes(getattr(formulas, quantity))[mask]
+            largest = float(np.nanmax(measure_sizes(getattr(formulas, quantity))))
             units = {"theta": 1.0, "omega": measure_sizes(formulas.at.speed).max()}
-            unit = float(units.get(quantity[:5], of_formulas.max()))
+            unit = float(units.get(quantity[:5], largest))
             condition = find_condition(quantity, scene.linkage, formulas)
             turned = divide(rounding * unit, condition)
             allowed = turned + TIMES_PREDICTED * left

@@ -614,6 +614,7 @@ TRUSS = """
 def test_three_pins_of_a_triangle_stand_unless_two_are_on_one_axis():
     truss, four_bar = report_of(TRUSS.format(0.1), held=("h",)).closures
     assert truss.reason == "3 hinges in a plane cannot move"
+    assert "; hinges " in truss.text
     assert four_bar.loop.lengths == approx((0.1, 0.05, 0.05, math.hypot(0.03, 0.07)))
     _, turning = report_of(TRUSS.format(0.0), held=("h",)).closures
     assert "moves its bars too" in turning.reason

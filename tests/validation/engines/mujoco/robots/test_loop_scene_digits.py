@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
+import fourbar
 from fourbar.formulas.mobility import classify
 from fourbar_validation.compare.rows import DEGRADED, FAILS
 from fourbar_validation.compare.tolerance import SIMULATED
@@ -144,6 +145,8 @@ def test_a_file_has_the_lengths_of_the_scene_that_was_made_from_it():
     described = describe_model(found.see(), 0.0)
     assert described["lengths.output"].value == scene.linkage.output.length
     assert found.loop.name == "rod" and found.loop.remarks
+    own = replace(scene, linkage=fourbar.uniform(*pose_loop(FREE)[1].lengths))
+    assert find_loop_of_scene(file, own, AS_DRAWN).loop.rounding == 0.0
 
 
 def test_the_range_of_the_motor_is_that_of_the_file():

@@ -35,6 +35,15 @@ def test_coefficients_zero_and_sense_are_those_of_the_file(tmp_path):
     assert equality.remark.endswith("but follow is 0.000 mm from lead in the file")
 
 
+def test_a_leader_on_a_body_that_moves_has_no_ground_beside_it(tmp_path):
+    path = tmp_path / "robot.xml"
+    body = '<body name="one">'
+    slide = '<body name="cart"><joint type="slide"/><geom size="0.1"/>'
+    text = FILE.replace(body, slide + body)
+    path.write_text(text.replace('<body name="two">', '</body><body name="two">'))
+    assert read_joint_equality(read_robot(path), "follow", LOOP).leader == "lead"
+
+
 TENDONS = """<mujoco><worldbody>
 <body name="one"><joint name="lead" axis="0 0 1" ref="30"/><geom size="0.1"/></body>
 <body name="two"><joint name="follow" axis="0 0 -1" ref="9"/><geom size="0.1"/></body>

@@ -10,6 +10,7 @@ from fourbar.errors import InputError
 from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import CROSSED, OPEN
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
+from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.judge_loop import FILE_THROUGH_TIME
 from fourbar_validation.robots.loop_errors import find_left_out, find_worst_of_loop
 from fourbar_validation.robots.report import SCENE_ROUND_OFF
@@ -149,3 +150,36 @@ def test_what_is_not_judged_is_said_of_a_file_with_its_own_flywheel_too():
     assert judged < positions
     (note,) = [note for note in notes_of(examined) if "are not judged" in note]
     assert f"({positions - judged} of {positions} positions" in note
+
+
+TWO_LOOPS = """
+<mujoco><asset><mesh name="m" file="m.stl"/></asset>
+<default><geom type="capsule" size=".01"/><joint axis="0 1 0"/></default><worldbody>
+<body><joint/><geom fromto="0 0 0 .1 0 0"/>
+ <body pos=".1 0 0"><joint/><geom fromto="0 0 0 .25 0 .1"/>
+  <site name="end" pos=".25 0 .1"/></body></body>
+<body pos=".3 0 0"><joint/><geom fromto="0 0 0 .05 0 .1"/>
+ <site name="top" pos=".05 0 .1"/></body>
+<body name="bare" pos="0 .5 0"><joint/><geom type="mesh" mesh="m"/>
+ <body pos=".1 0 0"><joint/><geom fromto="0 0 0 .25 0 .1"/>
+  <site name="end 2" pos=".25 0 .1"/></body></body>
+<body pos=".33 .5 0"><joint/><geom fromto="0 0 0 .05 0 .1"/>
+ <site name="top 2" pos=".02 0 .1"/></body>
+</worldbody><equality><connect name="whole" site1="end" site2="top"/>
+<connect name="bare" site1="end 2" site2="top 2"/></equality></mujoco>
+"""
+
+
+def test_a_loop_is_judged_beside_one_whose_masses_are_unknown(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(TWO_LOOPS)
+    file = read_robot(path)
+    coupler = math.hypot(0.25, 0.1)
+    for name, ground, x in (("whole", 0.3, 0.05), ("bare", 0.33, 0.02)):
+        bars = fourbar.uniform(ground, 0.1, coupler, math.hypot(x, 0.1))
+        scene = fourbar.Scene(bars, fourbar.Motion(0.0, 1.0))
+        if name == "whole":
+            assert find_loop_of_scene(file, scene, AS_DRAWN).loop.name == name
+            continue
+        with pytest.raises(InputError, match="its mass is unknown"):
+            find_loop_of_scene(file, scene, AS_DRAWN)

@@ -310,9 +310,8 @@ class _Finder:
         """Say what a chain is made of, and how far it is from closed and planar."""
         model = self.model
         yield f"ground {chain.ground_name}"
-        if chain.hinges:
-            hinges = (name_joint(model, joint) for joint in chain.hinges)
-            yield f"hinges {', '.join(hinges)}"
+        if hinges := chain.hinges or self.standing.get(chain.number):
+            yield f"hinges {', '.join(name_joint(model, one) for one in hinges)}"
         if chain.others:
             others = (
                 f"{name_joint(model, joint)} ({JOINT_WORDS[kind]})"

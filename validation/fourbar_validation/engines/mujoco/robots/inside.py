@@ -267,6 +267,9 @@ class LoopInside:
         inertias[self.lead] -= self.flywheel
         armature = HEAVY * float(inertias.max())
         model.dof_armature[self.held] += armature
+        # the solver counts its tolerance in parts of the mean inertia
+        mean = model.stat.meaninertia
+        model.opt.tolerance *= mean / (mean + armature * len(self.held) / model.nv)
         return model, armature
 
     def angle(self, qpos: Array) -> float:

@@ -222,11 +222,14 @@ class SceneOfLoop(SeenLoop):
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
         self.carried = {bar: self.list_parts(bar) for bar in MOVING_BARS}
         self.bodies = {body for bodies in self.carried.values() for body in bodies}
+        gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
+        self.gravity = np.asarray(gravity, float)
+
+    def require_masses(self) -> None:
+        """Refuse a bar of unknown mass, and say which parts of bars have none."""
         parts = list_unknown_parts(self.compiled, self.bodies)
         if parts:
             self._leave_out(f"the mass of {', '.join(parts)}, whose mesh is missing")
-        gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
-        self.gravity = np.asarray(gravity, float)
 
     def write_parts(self) -> tuple[str, ...]:
         """Say which joint is which pin, which body which bar, and what is held."""
@@ -266,6 +269,7 @@ class SceneOfLoop(SeenLoop):
 
     def describe(self, speed: float, title: str, source: str) -> Scene:
         """Describe the scene."""
+        self.require_masses()
         lumps = {bar: self.lump(bar) for bar in MOVING_BARS}
         armature = self._list_armature()
         lengths = self.meet_lengths().met
@@ -296,18 +300,21 @@ class SceneOfLoop(SeenLoop):
             linkage, motion, loads=loads, effects=effects, title=title, source=source
         )
 
-    def meet_lengths(self) -> RobotLoop:
+    def meet_lengths(self, wanted: Lengths | None = None) -> RobotLoop:
         """Read the lengths within the digits of the file, and say which are equal.
 
         MuJoCo saves positions and quaternions with six significant digits, and so do
         many generators. The lengths of a parallelogram then differ in their seventh
         digit, and the linkage as it stands has no change point and another range. As in
         a scene that states rounded lengths or coordinates, the lengths are those of the
-        parallelogram or kite that the digits cannot tell from the file's.
+        parallelogram or kite that the digits cannot tell from the file's. They are the
+        file's own where these are nearer to those of a scene, `wanted`.
         """
         d, a, b, c = map(round_off, self.loop.lengths)
         stated = (d, a, b, c)
         met = tuple(map(round_off, self._meet_lengths(stated)))
+        if wanted and math.dist(wanted, stated) < math.dist(wanted, met):
+            met = stated
         equal = [
             f"{first} and {second}, which differ by {gap:.4g} m"
             for first, second, gap in list_met_equalities(stated, met)

@@ -217,6 +217,8 @@ class _RestPose:
         if bearer > 1:
             body = self.roots[find_parent(model, model.jnt_bodyid[follower])]
             other = model.body_jntadr[body]
+        if other < 0:  # it hangs on the world, beside the ground of the scene
+            return ""
         length = float(np.linalg.norm(self._find_line(follower, other)))
         in_scene = self.scene.linkage.lengths[bearer - 1]
         if _is_same_number(length, in_scene):

@@ -162,7 +162,8 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
     ways = [*loops]
     if options.pose.drive is None:
         ways = [way for one in loops for way in (one, one.from_other_end or one)]
-    ways = [SceneOfLoop(posed, way).meet_lengths() for way in ways]
+    lengths = scene.linkage.lengths
+    ways = [SceneOfLoop(posed, way).meet_lengths(lengths) for way in ways]
     model = posed.model
     names = [name_body(model, body) for body in range(model.nbody)]
     wanted = {}
@@ -183,7 +184,8 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
     loop, robot = close_onto(scene, posed, loop)
     described = SceneOfLoop(robot, loop)
-    loop = described.meet_lengths()
+    described.require_masses()
+    loop = described.meet_lengths(lengths)
     remarks = (*loop.remarks, *described.remarks)
     return LoopOfScene(
         file,

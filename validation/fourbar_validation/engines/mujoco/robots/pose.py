@@ -175,9 +175,9 @@ def _compile_links(
     bounds.balanceinertia = True
     return given.compile(), [
         f"MuJoCo refuses the links as they stand ({refused}): masses below"
-        f" {_LEAST_MASS:g} kg and moments of inertia below {_LEAST_MOMENT:g} kg m^2 are"
-        " raised to these, and three moments of which one exceeds the sum of the others"
-        " become their mean"
+        f" {bounds.boundmass:g} kg and moments of inertia below {bounds.boundinertia:g}"
+        " kg m^2 are raised to these, and three moments of which one exceeds the sum of"
+        " the others become their mean"
     ]
 
 
