@@ -511,7 +511,7 @@ class Bar(Described):
                 "mass",
                 stated,
                 "must be left out (0 in dataclasses.replace): density or"
-                " mass_per_length states it",
+                " mass_per_length states it, unless it is None",
                 unit="kg",
             )
 

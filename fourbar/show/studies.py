@@ -382,7 +382,7 @@ def _write_holding(rest: Equilibria, units: Conversion, width: int | None) -> st
     on = "" if positions.drive is not None else f" on bar {positions.drive_bar}"
     lines = [f"{drive.name}{on} that holds it at rest, and how it moves when released"]
     sizes = np.nan_to_num(np.abs(values))
-    most = int(np.argmax(sizes))
+    most = int(np.argmax(sizes >= (1.0 - _SAME_SIZE) * sizes.max()))  # the first
     if sizes[most] > 0.0:
         largest = "largest of these positions"
         if low is not None:
@@ -405,6 +405,8 @@ def _write_range(rest: Equilibria, ends: tuple[RestPosition, RestPosition]) -> s
     return "everywhere on its circuit" if abs(apart) < _SAME_PLACE else text
 
 
+_SAME_SIZE = 1e-9
+"""Part of the largest torque or force by which another one is as large."""
 _SAME_PLACE = 1e-9
 """Angle between the ends of a range, rad, below which it goes round: no friction holds
 within less, and nothing is printed finer than 1e-6 rad.

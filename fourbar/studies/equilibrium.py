@@ -429,7 +429,9 @@ def _find_moves(curve: CircuitCurve, positions: Solution) -> Signs:
     psi = positions.theta_2 - curve.theta_1
     mu = positions.branch * transmission_angle(curve.ratios, psi)
     points = np.stack([psi, mu], axis=1)
-    level = ROUND_OFF_OF_Q * curve.size(points)
+    size = curve.size(points)
+    # where all terms vanish together their rounding does not
+    level = ROUND_OFF_OF_Q * np.fmax(size, np.nanmedian(size))
     ahead = _add_friction(curve, points, 1) > level
     back = _add_friction(curve, points, -1) < -level
     sense = np.where(ahead, 1, -1 * back) * np.sign(curve.state(points).k.h2)

@@ -450,6 +450,15 @@ def test_equilibria_are_printed_in_the_units_of_the_file(show):
         assert words in printed
 
 
+def test_a_crank_that_hangs_stays_there_when_released():
+    """Its weight has no lever at 90 and 270 deg, but for the angle's rounding."""
+    bars = FourBar(0.4, Bar(0.1, 1.0), Bar(0.35), Bar(0.26))
+    motion = Motion(np.radians(np.arange(0.0, 360.0, 30.0)), 0.0)
+    equilibria = equilibrium(Scene(bars, motion, effects=(DOWN,)))
+    moves = dict(zip(range(0, 360, 30), equilibria.moves.tolist(), strict=True))
+    assert (moves[90], moves[270], moves[60], moves[120]) == (0, 0, -1, 1)
+
+
 @mark.slow
 def test_at_a_change_point_a_released_parallelogram_has_two_ways_to_move():
     """Elsewhere it falls: the height of its mass centres grows with sin(theta_2)."""

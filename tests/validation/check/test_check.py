@@ -687,6 +687,14 @@ def test_rates_of_the_rows_are_named_where_the_scene_states_others(read):
         assert told.text.endswith(text) and told.complete
 
 
+def test_another_unit_of_a_speed_comes_before_a_fitted_one(read):
+    solution = solve(OURS)
+    x, y = 1e3 * solution.v_B.T
+    table = read(tabulate({"theta_2": solution.theta_2, "v_B_x": x, "v_B_y": y}))
+    first, *_ = Judgement(OURS, table).explanations
+    assert first.text.startswith("units: numbers in mm/s where m/s")
+
+
 def test_shaking_takes_part_in_a_mistake(read):
     still = solve(replace(OURS, effects=()))
     x, y = derive(still, "shaking_force").T

@@ -34,6 +34,7 @@ from fourbar_validation.robots.differences import find_differences
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
+    judge_file,
     list_rows,
 )
 from fourbar_validation.robots.loop_errors import find_left_out
@@ -176,6 +177,14 @@ def test_what_the_stiffest_constraint_leaves_is_the_error_of_a_file_that_has_it(
         size = float(np.hypot(*np.asarray(getattr(ours, pin)).T).max())
         off = error_of(DRY, examined_dry(), FILE_AT_ONE_STATE, pin)
         assert left[pin] / size == approx(off, rel=1e-3)
+
+
+def test_a_file_that_differs_in_nothing_is_told_that_its_timestep_is_the_limit():
+    file = file_of(write_mjcf(ROTOR, drive="flywheel"))
+    report = judge_file("rotor", ROTOR, file, replace(AS_DRAWN, error=1e-14))
+    assert not report.differences
+    (said,) = report.sentences()
+    assert "advise SCENE --error E finds a timestep" in said
 
 
 def test_no_softness_lets_a_file_be_wrong_by_more_than_a_tenth():

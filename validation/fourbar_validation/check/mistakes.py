@@ -279,8 +279,12 @@ def explain(
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
         found = [one for one in found if one.whole]
+
+    def rank(one: Explanation) -> tuple[int, bool, bool]:
+        return -len(one.quantities), one.text.endswith(FITTED), not one.whole
+
     unlike: dict[object, Explanation] = {}
-    for one in sorted(found, key=lambda one: (-len(one.quantities), not one.whole)):
+    for one in sorted(found, key=rank):
         unlike.setdefault((one.text, one.quantities), one)
     return list(unlike.values())[:MOST_EXPLANATIONS]
 

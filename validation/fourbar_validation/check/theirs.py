@@ -102,6 +102,7 @@ OTHER_UNITS = {
     "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
     "rad/s^2": ("rad/s^2", "deg/s^2", "rpm/s"),
     "m": ("m", "mm", "cm", "in", "ft"),
+    "m/s": ("m/s", "mm/s", "cm/s", "in/s", "ft/s"),
     "m/s^2": ("m/s^2", "mm/s^2", "cm/s^2", "in/s^2", "ft/s^2", "g0"),
     "N": ("N", "kN", "mN", "lbf", "kgf"),
     "N m": (
@@ -254,8 +255,8 @@ def _read_columns(
         raise InputError(
             "header",
             headings,
-            f"needs a column {commanded} (say {commanded} [deg] for degrees), or the"
-            f" angle of another bar; {_KNOWN}",
+            f"needs a column {commanded} (say {commanded} [deg] for degrees), the angle"
+            f" of another bar, or the time; {_KNOWN}",
         )
     _require_cells(len(headings), rows)
     numbers = {}

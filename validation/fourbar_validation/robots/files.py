@@ -280,7 +280,9 @@ class _RobotReading:
             name = pin.get("name") or "-".join(links)
             if len(links) != 2 or not known.issuperset(links):
                 raise self._refuse(
-                    name, "must name two links, with the pin's x, y and z in each"
+                    name,
+                    "must name two links, with the pin's x, y and z in each:"
+                    f" {_LOOP_JOINT}",
                 )
             self.notes.append(
                 f"{name} closes a loop: it is a <connect>, which holds its point and "

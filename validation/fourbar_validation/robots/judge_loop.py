@@ -80,6 +80,11 @@ _ADVICE = (
     "What to type into the file for an error E, as far as its settings are the cause: "
     "fourbar-validation advise SCENE FILE.xml --error E"
 )
+_AS_GENERATED = (
+    "The generated MJCF is wrong by as much: beside a limit position or a change point"
+    " its timestep is too long. --error E states what this file may be wrong by, and"
+    " fourbar-validation advise SCENE --error E finds a timestep."
+)
 _LENGTHS_FIRST = (
     "Mend the lengths first: what contacts and settings cost here is a cost in another"
     " linkage."
@@ -113,6 +118,8 @@ class LoopJudgement:
             )
         if self.is_of_another_linkage:
             yield _LENGTHS_FIRST
+        elif self.counts[FAILS] and not self.differences:
+            yield _AS_GENERATED
         elif self.counts[FAILS] and any(
             is_setting(one.key) and one.written for one in self.differences
         ):

@@ -539,7 +539,7 @@ class _Closing:
         if self.model.jnt_limited[free].any():
             within = " within the joints' ranges"
         text = f"all loops{within}; what is left is {1e3 * left:.3g} mm or mrad"
-        closed = self.close(stated, self.held)
+        closed = self.find_pose(stated, self.held, set())
         if options.joints and self.size(closed) <= LARGEST_RESIDUAL:
             return (
                 f"--pose holds {', '.join(options.joints)}, around which the other"
