@@ -655,6 +655,17 @@ def test_dry_friction_holds_a_range_of_torques_at_rest(alpha, part, code, words,
     assert result == int(code) and words in out
 
 
+def test_a_rounded_log_of_a_start_has_digits_where_it_starts(check):
+    """Half a unit of its speed is no reversal of the whole of dry friction."""
+    rates = {"omega_2": [0.0, 1.0, 2.0], "alpha_2": [9.0, 9.0, 9.0]}
+    rubbing = replace(OURS, effects=(Friction.at(O2=0.5),))
+    logged = solve(replace(rubbing, motion=Motion([0.4, 0.5, 0.6], *rates.values())))
+    columns = {"theta_2": logged.theta_2, **rates, "torque": logged.torque}
+    text = write(columns, ("omega_2", "alpha_2", "torque"), 6)
+    _, out, _ = check(replace(rubbing, motion=Motion(0.4)), text)
+    assert "3 of 3 numbers agree" in out
+
+
 @mark.parametrize(
     "share, code", [(-1.0, HOLDS), (0.0, HOLDS), (1.0, HOLDS), (0.5, FAILED)]
 )
@@ -1077,6 +1088,7 @@ def with_comma(theta, torque):
         ("# made by hand\ntheta_2 [deg],torque",),
         ("# run 7\n# theta_2 [deg], torque [N m]",),
         ("Motion study 1\n,\ntheta_2 [deg],torque [N m]",),
+        ('"Run 3, of May"\n"theta_2\n[deg]","torque\n[N m]"',),
         ("Study 1;\nKurbelwinkel [deg];Drehmoment [N m]", with_comma),
         ("theta_2 [deg];torque [uN m]", in_thousands),
         ("Kurbelwinkel [deg];Drehmoment [N m]", "{theta:.0f};{torque:.9f}"),

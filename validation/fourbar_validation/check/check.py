@@ -56,6 +56,8 @@ class Judgement(Judge):
         every = self.columns
         known = [k for k, one in every.items() if one.quantity in UNITS]
         motion = [k for k in known if STAGE_OF.get(every[k].quantity) != "force"]
+        if all(one.quantity in UNITS for one in every.values() if one.label in labels):
+            known = list(every)  # what is derived and agrees refutes a mistake
         for keys in dict.fromkeys(map(tuple, (every, known, motion))):
             part = copy(self)
             part.columns = {key: every[key] for key in keys}

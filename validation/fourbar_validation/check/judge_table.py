@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from fourbar.quantities import (
     UNITS,
     Array,
 )
-from fourbar.scene import Scene
+from fourbar.scene import Command, Scene
 from fourbar.show.driving import begin_to_move, find_senses, leaves_range
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -182,7 +182,7 @@ class JudgedColumn:
         A drive that dry friction holds at rest has a range of them. One that starts or
         stops is stated with the whole of it or, as a solution has it, without.
         """
-        nearest = self._approach(self.ours, self.judge.holds).copy()
+        nearest = self._approach(self.ours, self.judge.holds)
         for ours in map(self.take, self.judge.begun):
             apart, so_far = (
                 compute_difference(
@@ -193,6 +193,7 @@ class JudgedColumn:
                 for right in (ours, nearest)
             )
             closer = apart < so_far
+            nearest = nearest.copy()
             nearest[closer] = ours[closer]
         return nearest
 
@@ -246,9 +247,12 @@ class JudgedColumn:
 
         Infinite where no digit is left.
         """
+        ours = [self.ours, *map(self.take, self.judge.begun)]
         moves = [
-            compute_difference(self.quantity, self.ours, self.take(other))
-            for other in self.judge.near
+            np.fmin.reduce(
+                [compute_difference(self.quantity, one, moved) for one in ours]
+            )
+            for moved in map(self.take, self.judge.near)
         ]
         spread = divide(np.fmax.reduce(moves), self.divisor) if moves else 0.0
         allowed = self.exact + spread + self.judge.slack
@@ -413,13 +417,22 @@ class Judge:
         return np.asarray(leaves_range(self.right))
 
     @cached_property
+    def _senses(self) -> Array:
+        """Senses in which rows at rest start and come to rest, (2, n)."""
+        return find_senses(self.right)
+
+    @cached_property
     def begun(self) -> list[Solution]:
         """Solutions with the whole of dry friction where rows start or stop by it.
 
         A row that turns back has it in the one sense or the other.
         """
-        senses = find_senses(self.right)
-        begun = begin_to_move(self.at.speed, senses) if senses.any() else []
+        senses = self._senses
+        begun = (
+            begin_to_move(self.at.speed, np.unique(senses, axis=0))
+            if senses.any()
+            else []
+        )
         return [
             solve(self.scene, self.stage, at=self.at._replace(speed=speed))
             for speed in begun
@@ -453,9 +466,18 @@ class Judge:
     def near(self) -> list[Solution]:
         """Solutions half a unit of rounded angles and rates away, to either side.
 
-        The list is empty if none is rounded.
+        The list is empty if none is rounded. What starts or stops keeps its sense.
         """
-        return [solve(self.scene, self.stage, at=at) for at in self.rows.near]
+        near = self.rows.near
+        if self._senses.any():
+            near = tuple(map(self._keep_senses, near))
+        return [solve(self.scene, self.stage, at=at) for at in near]
+
+    def _keep_senses(self, at: Command) -> Command:
+        """Return a command at whose rounded speeds no row starts or stops backwards."""
+        speed: Any = at.speed
+        back = (speed * self._senses < 0.0).all(axis=0)
+        return at._replace(speed=np.where(back, -speed, speed))
 
     @cached_property
     def findings(self) -> list[Discrepancy]:

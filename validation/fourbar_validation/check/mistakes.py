@@ -122,13 +122,15 @@ def list_rates_of_rows(
             judge.scene,
             table,
             judge.tolerance,
-            rows._replace(near=near),
+            rows._replace(near=tuple(at for at in near if at is not rows.at)),
             judge.slack,
         )
 
         def predict(quantity: str) -> Array | None:
             values = compute_column(logged.right, quantity)
-            return take_theirs(logged, values, quantity, lambda column: ~column.wrong)
+            return take_theirs(
+                logged, values, quantity, lambda column: column.answered & ~column.wrong
+            )
 
         yield Mistake(text, predict)
 

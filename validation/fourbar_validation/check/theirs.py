@@ -473,10 +473,16 @@ def _remove_comments(text: str) -> str:
 
 
 def _remove_titles(text: str) -> str:
-    """Blank the lines of one cell above the first line of several."""
+    """Blank the lines of one cell above the first line of several.
+
+    A heading in quotes may go on in the next line.
+    """
     lines = text.splitlines()
-    cells = ([*filter(str.strip, re.split("[,;\t]", line))] for line in lines)
-    first = next((i for i, line in enumerate(cells) if len(line) > 1), 0)
+    # what is quoted is in one cell; a quote that is left over is not closed here
+    plain = (re.sub('"[^"]*"', "x", line) for line in lines)
+    cells = ([*filter(str.strip, re.split("[,;\t]", line))] for line in plain)
+    several = (len(line) > 1 or '"' in "".join(line) for line in cells)
+    first = next((i for i, one in enumerate(several) if one), 0)
     return "\n".join([*[""] * first, *lines[first:]]) + "\n"
 
 
