@@ -80,13 +80,15 @@ def find_senses(solution: Solution) -> Array:
     speed: Any = solution.at.speed
     acceleration = solution.at.acceleration
     at_rest = lacks_friction(solution) & (speed == 0.0)
+    if not at_rest.any():
+        return np.zeros((2, len(solution)))
     largest = float(np.nanmax(np.abs(acceleration), initial=0.0))
     growth = drop_rounding(acceleration, largest)
     starts = np.where(at_rest, np.sign(growth), 0.0)
-    moves = np.sign(speed) * np.ones(len(starts)) if at_rest.any() else starts
+    moves = np.sign(speed) * np.ones(len(starts))
     before, after = np.append(0.0, moves[:-1]), np.append(moves[1:], 0.0)
     law = solution.stated.motion.law
-    if law is not None and solution.time is not None and at_rest.any():
+    if law is not None and solution.time is not None:
         # it moves beside a single instant too
         first, last = law.time[0], law.time[-1]
         away = _BESIDE * (last - first)

@@ -319,7 +319,8 @@ class Facts:
         if self.drive is not None and self.drive.error is not None:
             of_drive = self.relate_errors(self.drive.error, self.drive.sizes)
             shares = np.append(shares, of_drive)
-        return max(shares[np.isfinite(shares)].tolist(), default=None)
+        known = shares[np.isfinite(shares)]
+        return float(known.max()) if known.size else None
 
     def relate_errors(self, error: Array, size: Array) -> Array:
         """Return error bars over the sizes of the values, (n,), NaN where none is.
