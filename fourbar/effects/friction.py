@@ -20,9 +20,9 @@ class Friction(PinRows):
     torques: tuple[tuple[str, float], ...]
     key = "friction"
     in_balls = True
-    joint_elements: ClassVar = {"gazebo": "friction"}
+    joint_elements: ClassVar[dict[str, str]] = {"gazebo": "friction"}
     example = 'friction = { A = "0.05 N m" }'
-    numbers: ClassVar = {"": Declared("N m", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m", AT_LEAST_ZERO)}
     dry = True
 
     @property

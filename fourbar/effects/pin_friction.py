@@ -64,7 +64,7 @@ class PinFriction(PinRows):
     pins: tuple[tuple[str, float, float], ...]
     key = "pin_friction"
     example = 'pin_friction = { A = { coefficient = 0.1, radius = "8 mm" } }'
-    numbers: ClassVar = {
+    numbers: ClassVar[dict[str, Declared]] = {
         "coefficient": Declared("1", AT_LEAST_ZERO),
         "radius": Declared("m", AT_LEAST_ZERO),
     }

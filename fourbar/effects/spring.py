@@ -62,7 +62,7 @@ class Spring(Line):
     )
     acts: Annotated[str | None, OneOf(SENSES)] = None
     stated_at = "effects.springs"
-    forms: ClassVar = {"gas": GAS}
+    forms: ClassVar[dict[str, dict[str, Declared]]] = {"gas": GAS}
 
     def __post_init__(self) -> None:
         Line.__post_init__(self)

@@ -40,7 +40,7 @@ class Torsion(PinRows):
         'torsion = { B = { stiffness = "2 N m/rad", rest = "30 deg",'
         ' preload = "0.1 N m" } }'
     )
-    numbers: ClassVar = {
+    numbers: ClassVar[dict[str, Declared]] = {
         "stiffness": Declared("N m/rad", POSITIVE),
         "rest": Declared("rad"),
         "preload": Declared("N m", left_out=0.0),

@@ -14,9 +14,9 @@ class Viscous(PinRows):
     coefficients: tuple[tuple[str, float], ...]
     key = "viscous"
     in_balls = True
-    joint_elements: ClassVar = {"gazebo": "damping", "drake": "damping"}
+    joint_elements: ClassVar[dict[str, str]] = {"gazebo": "damping", "drake": "damping"}
     example = 'viscous = { O2 = "0.01 N m s/rad" }'
-    numbers: ClassVar = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
+    numbers: ClassVar[dict[str, Declared]] = {"": Declared("N m s/rad", AT_LEAST_ZERO)}
 
     def act(self, actions: Actions, state: State) -> None:
         """Add M on bar j = -k (omega_j - omega_i), its opposite on bar i."""
