@@ -401,9 +401,9 @@ class Case(NamedTuple):
         Both are equal unless dry friction holds a pin at rest. The third value, (n,),
         is `JAMMED` where one of them is NaN because friction jams the motion that would
         begin, else 0; None: it jams nowhere. `effort`: that with friction at rest as 0.
-        The ends are those at which the linkage would begin to
-        move forwards or backwards, or, where only a pin comes to rest while the linkage
-        moves, those just before and after its reversal.
+        The ends are those at which the linkage would begin to move forwards or
+        backwards, or, where only a pin comes to rest while the linkage moves, those
+        just before and after its reversal.
         """
         actions = Actions(state, self.bodies)
         dry_pins = {pin for term in self.terms for pin in term.dry_pins}

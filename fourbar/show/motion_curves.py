@@ -288,7 +288,7 @@ def _fit_curves(solution: Solution) -> MotionCurves:
             return list_curves(solve(scene, stage, at=command_at(scene, places)))
 
         points = exact
-        if scene.motion.law is not None:
+        if stage == "force" and scene.motion.law is not None:
             # what accelerates from rest bears what stands beside that instant
             at_edges = solve(scene, stage, at=command_at(scene, edges))
             points = exact[~np.isin(exact, edges[find_senses(at_edges)[0] != 0.0])]
