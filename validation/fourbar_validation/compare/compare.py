@@ -4,6 +4,7 @@ The row states the position where the quantity is worst.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -571,12 +572,8 @@ def _mark_stated(quantity: str, code: Codes, ours: Array) -> Mask:
 
 def _count(codes: Codes) -> str:
     """Count positions by status: "3 singular, 5 no_torque"."""
-    counts = np.bincount(codes, minlength=len(STATUS_NAMES)).tolist()
-    return ", ".join(
-        f"{count} {name}"
-        for name, count in zip(STATUS_NAMES, counts, strict=True)
-        if count
-    )
+    counts = Counter(codes.tolist())
+    return ", ".join(f"{counts[code]} {STATUS_NAMES[code]}" for code in sorted(counts))
 
 
 def mark_moving_drive(scene: Scene, formulas: Solution) -> Mask:

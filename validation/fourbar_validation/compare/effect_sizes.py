@@ -20,17 +20,7 @@ from fourbar_validation.compare.reversals import compute_slip
 from fourbar_validation.compare.tolerance import magnitude, sum_lengths
 
 if TYPE_CHECKING:
-    from fourbar.effects import (
-        Effect,
-        Flywheel,
-        Friction,
-        Gravity,
-        Load,
-        PinFriction,
-        Springs,
-        Torsion,
-        Viscous,
-    )
+    from fourbar import effects
 
 
 def _find_shortest(linkage: FourBar) -> float:
@@ -50,7 +40,7 @@ def _multiply_levers(linkage: FourBar, places: Iterable[tuple[int, float]]) -> f
     )
 
 
-def _find_gravity(gravity: "Gravity", linkage: FourBar, _: Solution) -> float:
+def _find_gravity(gravity: "effects.Gravity", linkage: FourBar, _: Solution) -> float:
     """Sum the weights with their levers about the bars' first pins."""
     bars = zip(MOVING_BARS, linkage.moving, strict=True)
     return sum(
@@ -61,19 +51,23 @@ def _find_gravity(gravity: "Gravity", linkage: FourBar, _: Solution) -> float:
     )
 
 
-def _find_viscous(viscous: "Viscous", linkage: FourBar, formulas: Solution) -> Any:
+def _find_viscous(
+    viscous: "effects.Viscous", linkage: FourBar, formulas: Solution
+) -> Any:
     return sum(
         k * np.abs(compute_slip(formulas, pin)) / _find_shortest(linkage)
         for pin, k in viscous.coefficients
     )
 
 
-def _find_friction(friction: "Friction", linkage: FourBar, _: Solution) -> float:
+def _find_friction(
+    friction: "effects.Friction", linkage: FourBar, _: Solution
+) -> float:
     return sum(torque for _, torque in friction.torques) / _find_shortest(linkage)
 
 
 def _find_pin_friction(
-    friction: "PinFriction",
+    friction: "effects.PinFriction",
     linkage: FourBar,
     formulas: Solution,
 ) -> Any:
@@ -85,13 +79,13 @@ def _find_pin_friction(
     )
 
 
-def _find_torsion(torsion: "Torsion", linkage: FourBar, _: Solution) -> float:
+def _find_torsion(torsion: "effects.Torsion", linkage: FourBar, _: Solution) -> float:
     """Sum the couples at half a turn from rest, beyond which there are none."""
     couples = (abs(preload) + k * math.pi for _, k, _, preload in torsion.springs)
     return sum(couples) / _find_shortest(linkage)
 
 
-def _find_springs(springs: "Springs", linkage: FourBar, _: Solution) -> float:
+def _find_springs(springs: "effects.Springs", linkage: FourBar, _: Solution) -> float:
     """Sum the tensions with their levers.
 
     The ends stay within the linkage and the arms to them.
@@ -105,12 +99,14 @@ def _find_springs(springs: "Springs", linkage: FourBar, _: Solution) -> float:
     return total
 
 
-def _find_flywheel(flywheel: "Flywheel", linkage: FourBar, formulas: Solution) -> Any:
+def _find_flywheel(
+    flywheel: "effects.Flywheel", linkage: FourBar, formulas: Solution
+) -> Any:
     alpha = np.abs(getattr(formulas, f"alpha_{flywheel.bar}"))
     return flywheel.inertia * alpha / linkage.bar(flywheel.bar).length
 
 
-def _find_load(load: "Load", linkage: FourBar, _: Solution) -> float:
+def _find_load(load: "effects.Load", linkage: FourBar, _: Solution) -> float:
     """Return the force with its lever, and the couple over the bar's length.
 
     The table's factor is its greatest.
@@ -147,7 +143,9 @@ SIZE_OF: dict[str, Callable[[Any, FourBar, Solution], Array | float]] = {
 """Size of the forces of an effect, by its key; effects of others bring their own."""
 
 
-def find_size(effect: "Effect", linkage: FourBar, formulas: Solution) -> Array | float:
+def find_size(
+    effect: "effects.Effect", linkage: FourBar, formulas: Solution
+) -> Array | float:
     """Return the size of an effect's forces, N, (n,) or one for all positions.
 
     An effect without one raises FourBarError: nothing is judged by another effect's

@@ -29,31 +29,25 @@ def mark_reversing(
     good as any couple up to the friction's.
     """
     mask = np.zeros(len(solution), dtype=bool)
+    omega = _find_speeds(solution)
+    size = {bar: np.abs(speed) for bar, speed in omega.items()}
+    fastest = np.nan_to_num(np.max([size[bar] for bar in MOVING_BARS], axis=0))
     for pin in {pin for effect in scene.effects for pin in effect.dry_pins}:
-        mask |= _mark_resting(solution, pin, slip)
+        i, j = PINS[pin]
+        speeds = size[i] + size[j] + size[2]
+        slips = np.abs(omega[j] - omega[i]) * solution.condition**2
+        mask |= (slips <= slip * speeds) & (speeds > 0.0)
         if in_time:
-            speeds = np.max(
-                [np.abs(_compute_speeds(solution)[bar]) for bar in MOVING_BARS],
-                axis=0,
-            )
-            speeds = np.nan_to_num(speeds)
-            mask |= speeds <= slip * speeds.max()
+            mask |= fastest <= slip * fastest.max()
     return mask
-
-
-def _mark_resting(solution: Solution, pin: str, slip: float) -> Mask:
-    one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
-    speeds = np.abs(one) + np.abs(second) + np.abs(_compute_speeds(solution)[2])
-    return np.asarray(
-        (np.abs(second - one) * solution.condition**2 <= slip * speeds) & (speeds > 0.0)
-    )
 
 
 def compute_slip(solution: Solution, pin: str) -> Array:
     """Return omega_j - omega_i of the bars that meet at a pin, rad/s, (n,)."""
-    one, second = (_compute_speeds(solution)[bar] for bar in PINS[pin])
-    return np.asarray(second - one)
+    i, j = PINS[pin]
+    omega = _find_speeds(solution)
+    return np.asarray(omega[j] - omega[i])
 
 
-def _compute_speeds(solution: Solution) -> dict[int, Any]:
+def _find_speeds(solution: Solution) -> dict[int, Any]:
     return {1: 0.0, 2: solution.omega_2, 3: solution.omega_3, 4: solution.omega_4}

@@ -312,14 +312,8 @@ def write_results(rows: Iterable[Row], path: Path) -> None:
     write_text(path, write_rows(rows))
 
 
-_WORDING = {
-    AGREES: ("agrees", "agree"),
-    DEGRADED: ("degraded as predicted", "degraded as predicted"),
-    FAILS: ("fails", "fail"),
-    REFUSES: ("refuses", "refuse"),
-    UNDECIDED: ("undecided", "undecided"),
-}
-"""Words for each verdict: of one comparison, and of several."""
+_PLURALS = {AGREES: "agree", FAILS: "fail", REFUSES: "refuse"}
+"""Verdicts of several comparisons, where they are other words than of one."""
 
 
 class Counts:
@@ -432,7 +426,7 @@ class Counts:
 
     def _write_worded(self, verdicts: Iterable[str]) -> list[str]:
         return [
-            f"{count} {_WORDING[verdict][count != 1]}"
+            f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
             for verdict in verdicts
             if (count := self._answers[verdict])
         ]
@@ -445,8 +439,6 @@ def keep_worst(rows: Iterable[Row]) -> list[Row]:
     def badness(row: Row) -> tuple[int, float]:
         return VERDICTS.index(row.verdict), float(find_used(row.error, row.allowed))
 
-    for row in rows:
-        key = row.setting, row.quantity
-        if key not in worst or badness(row) > badness(worst[key]):
-            worst[key] = row
+    for row in sorted(rows, key=badness, reverse=True):
+        worst.setdefault((row.setting, row.quantity), row)
     return list(worst.values())

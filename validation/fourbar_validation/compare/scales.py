@@ -11,14 +11,14 @@ too small, an acceleration that is too large. So both are taken of the engine's 
 too, and the stricter pair of error and allowance counts.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.linkage import MOVING_BARS, Bar
-from fourbar.quantities import COUPLE, LINE, OK, RATES, UNITS, Array
+from fourbar.quantities import LINE, OK, RATES, UNITS, Array
 from fourbar.scene import Scene, StrokeOrigin
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Answer
@@ -80,12 +80,11 @@ class Scale(NamedTuple):
 
 
 class TermSizes:
-    """Sizes of the quantities of one solution of a scene, each sum computed once."""
+    """Sizes of the quantities of one solution of a scene."""
 
     def __init__(self, scene: Scene, solution: Solution) -> None:
         self.scene = state_from_pins(scene)
         self.solution = solution
-        self._sums: dict[str, Array] = {}
 
     def scale(self, quantity: str, values: Array) -> Scale:
         """Compute the size of a quantity and how far its terms cancel, (n,)."""
@@ -116,16 +115,94 @@ class TermSizes:
         Raises KeyError for a quantity of a unit that has no such sum here: nothing is
         judged by another's scale.
         """
-        unit = UNITS[quantity]
-        if unit in _OF_EACH_BAR:
-            key = quantity
-        else:
-            key = f"{unit} {_choose_bars(quantity)}"
-        if key not in self._sums:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                terms = TERMS_OF_UNIT[unit](quantity, self)
-            self._sums[key] = np.asarray(terms, dtype=float)
-        return self._sums[key]
+        sums = {
+            "m": self._sum_lengths,
+            "rad/s": self._sum_turning,
+            "m/s": self._sum_motion,
+            "rad/s^2": self._sum_turning,
+            "m/s^2": self._sum_motion,
+            "N": lambda _: self._forces,
+            "N m": lambda _: self._torques,
+            "W": self._sum_powers,
+        }
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return sums[UNITS[quantity]](quantity)
+
+    def _sum_lengths(self, _: str) -> Array:
+        linkage = self.scene.linkage
+        arms = sum(map(_compute_arm, linkage.moving)) + sum(self._drive_arms.values())
+        return np.full(len(self.solution), sum_lengths(linkage) + arms)
+
+    def _sum_turning(self, quantity: str) -> Array:
+        """Sum the terms of a speed or an acceleration of a bar."""
+        solution = self.solution
+        _, a, b, c = self.scene.linkage.lengths
+        rate, _, bar = quantity.partition("_")
+        terms: Array = np.abs(getattr(solution, f"{rate}_2"))
+        if bar == "2":
+            return terms
+        terms = a * terms
+        if rate == "alpha":
+            w2, w3, w4 = (getattr(solution, f"omega_{k}") for k in MOVING_BARS)
+            terms = a * w2 * w2 + terms + b * w3 * w3 + c * w4 * w4
+        return terms / ((b if bar == "3" else c) * solution.condition)
+
+    def _sum_motion(self, quantity: str) -> Array:
+        """Sum the terms of a point's velocity or acceleration, bar by bar."""
+        total = np.zeros(len(self.solution))
+        for number in (2,) if quantity in OF_THE_INPUT else MOVING_BARS:
+            bar = self.scene.linkage.bar(number)
+            reach = bar.length + _compute_arm(bar)
+            omega = getattr(self.solution, f"omega_{number}")
+            if UNITS[quantity] == "m/s":
+                total += (reach + self._drive_arms.get(number, 0.0)) * np.abs(omega)
+            else:
+                alpha = getattr(self.solution, f"alpha_{number}")
+                total += reach * (omega * omega + np.abs(alpha))
+        return total
+
+    @property
+    def _drive_arms(self) -> dict[int, float]:
+        """Distances from the bars' first pins to where a force drives, m."""
+        ends = () if self.scene.drive is None else self.scene.drive.ends
+        return {end.bar: abs(end.distance) for _, end in ends}
+
+    @cached_property
+    def _forces(self) -> Array:
+        """Magnitudes of all inertial and external forces, summed, as they drive, N.
+
+        Couples are divided by their bar's length. A short lever of a force that drives
+        makes it as many times larger.
+        """
+        scene = self.scene
+        solution = self.solution
+        linkage = scene.linkage
+        total = np.zeros(len(solution))
+        for number, bar in zip(MOVING_BARS, linkage.moving, strict=True):
+            lever = 1.0 + _compute_arm(bar) / bar.length
+            total += (
+                lever * find_mass(bar) * magnitude(getattr(solution, f"a_G{number}"))
+                + find_inertia(bar)
+                * np.abs(getattr(solution, f"alpha_{number}"))
+                / bar.length
+            )
+        for term in (*scene.loads, *scene.effects):
+            total += find_size(term, linkage, solution)
+        gain = 1.0
+        if scene.drive is not None:
+            short = find_most(linkage, scene.drive)
+            gain = max(1.0, max(linkage.lengths) / short)
+        return np.asarray(gain * total / solution.drive_condition)
+
+    @property
+    def _torques(self) -> Array:
+        return max(self.scene.linkage.lengths[1:]) * self._forces
+
+    def _sum_powers(self, _: str) -> Array:
+        if self.scene.drive is not None:
+            return self._forces * self._sum_motion("v_B")
+        speed: Array = getattr(self.solution, f"omega_{self.scene.drive_bar}")
+        return self._torques * np.abs(speed)
 
 
 def scale_of(quantity: str, scene: Scene, solution: Solution, values: Array) -> Scale:
@@ -133,137 +210,9 @@ def scale_of(quantity: str, scene: Scene, solution: Solution, values: Array) -> 
     return TermSizes(scene, solution).scale(quantity, values)
 
 
-_OF_EACH_BAR = ("rad/s", "rad/s^2")
-"""Units of quantities whose sums of terms differ from bar to bar."""
-
-
-def _sum_length_terms(_: str, sizes: TermSizes) -> Array:
-    scene = sizes.scene
-    arms = sum(map(_compute_arm, scene.linkage.moving)) + sum(
-        _compute_drive_arms(scene).values()
-    )
-    return np.full(len(sizes.solution), sum_lengths(scene.linkage) + arms)
-
-
-def _sum_speeds(quantity: str, sizes: TermSizes) -> Array:
-    formulas = sizes.solution
-    _, a, b, c = sizes.scene.linkage.lengths
-    omega_2 = np.abs(formulas.omega_2)
-    if quantity == "omega_2":
-        return omega_2
-    return a * omega_2 / ((b if quantity == "omega_3" else c) * formulas.condition)
-
-
-def _sum_angular_accelerations(quantity: str, sizes: TermSizes) -> Array:
-    formulas = sizes.solution
-    _, a, b, c = sizes.scene.linkage.lengths
-    w2 = formulas.omega_2
-    w3 = formulas.omega_3
-    w4 = formulas.omega_4
-    a2 = formulas.alpha_2
-    if quantity == "alpha_2":
-        return np.abs(a2)
-    terms = a * w2 * w2 + a * np.abs(a2) + b * w3 * w3 + c * w4 * w4
-    return terms / ((b if quantity == "alpha_3" else c) * formulas.condition)
-
-
-def _choose_bars(quantity: str) -> tuple[int, ...]:
-    """Choose the bars whose motion is a term of a point's velocity or acceleration."""
-    if quantity in OF_THE_INPUT:
-        return (2,)
-    return MOVING_BARS
-
-
-def _sum_velocities(quantity: str, sizes: TermSizes) -> Array:
-    total = np.zeros(len(sizes.solution))
-    drive = _compute_drive_arms(sizes.scene)
-    for number in _choose_bars(quantity):
-        arm = _compute_reach(sizes.scene, number) + drive.get(number, 0.0)
-        total += arm * np.abs(getattr(sizes.solution, f"omega_{number}"))
-    return total
-
-
-def _sum_accelerations(quantity: str, sizes: TermSizes) -> Array:
-    total = np.zeros(len(sizes.solution))
-    for number in _choose_bars(quantity):
-        omega = getattr(sizes.solution, f"omega_{number}")
-        alpha = getattr(sizes.solution, f"alpha_{number}")
-        growth = omega * omega + np.abs(alpha)
-        total += _compute_reach(sizes.scene, number) * growth
-    return total
-
-
-def _compute_reach(scene: Scene, number: int) -> float:
-    """Compute the length of a bar and the distance of its mass centre, m."""
-    bar = scene.linkage.bar(number)
-    return bar.length + _compute_arm(bar)
-
-
-def _sum_forces(_: str, sizes: TermSizes) -> Array:
-    scene = sizes.scene
-    formulas = sizes.solution
-    gain = 1.0
-    if scene.drive is not None:  # a short lever makes the force as many times larger
-        short = find_most(scene.linkage, scene.drive)
-        gain = max(1.0, max(scene.linkage.lengths) / short)
-    return gain * _sum_force_terms(scene, formulas) / formulas.drive_condition
-
-
-def _sum_torques(_: str, sizes: TermSizes) -> Array:
-    longest = max(sizes.scene.linkage.lengths[1:])
-    return longest * sizes.sum_terms(_A_FORCE)
-
-
-def _sum_powers(_: str, sizes: TermSizes) -> Array:
-    if sizes.scene.drive is not None:
-        return sizes.sum_terms(_A_FORCE) * sizes.sum_terms(_A_VELOCITY)
-    speed = getattr(sizes.solution, f"omega_{sizes.scene.drive_bar}")
-    return np.asarray(sizes.sum_terms(COUPLE.value) * np.abs(speed))
-
-
-_A_FORCE, _A_VELOCITY = "F12", "v_B"
-"""Quantities of their units to which every bar contributes."""
-TERMS_OF_UNIT: dict[str, Callable[[str, TermSizes], Array]] = {
-    "m": _sum_length_terms,
-    "rad/s": _sum_speeds,
-    "m/s": _sum_velocities,
-    "rad/s^2": _sum_angular_accelerations,
-    "m/s^2": _sum_accelerations,
-    "N": _sum_forces,
-    "N m": _sum_torques,
-    "W": _sum_powers,
-}
-"""Sum of the terms of a quantity's equation, by the quantity's unit."""
-
-
-def _compute_drive_arms(scene: Scene) -> dict[int, float]:
-    """Compute the distances from the bars' first pins to where a force drives, m."""
-    ends = () if scene.drive is None else scene.drive.ends
-    return {end.bar: abs(end.distance) for _, end in ends}
-
-
 def _compute_arm(bar: Bar) -> float:
     """Compute the distance of a bar's mass centre from its first pin, m."""
     return abs(find_centre(bar)[0])
-
-
-def _sum_force_terms(scene: Scene, formulas: Solution) -> Array:
-    """Sum the magnitudes of all inertial and external forces, N.
-
-    Couples are divided by their bar's length.
-    """
-    total = np.zeros(len(formulas))
-    for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True):
-        acceleration = getattr(formulas, f"a_G{number}")
-        alpha = getattr(formulas, f"alpha_{number}")
-        lever = 1.0 + _compute_arm(bar) / bar.length
-        total += (
-            lever * find_mass(bar) * magnitude(acceleration)
-            + find_inertia(bar) * np.abs(alpha) / bar.length
-        )
-    for term in (*scene.loads, *scene.effects):
-        total += find_size(term, scene.linkage, formulas)
-    return total
 
 
 def make_reference(scene: Scene, answer: Answer) -> Solution | None:

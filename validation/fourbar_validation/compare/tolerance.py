@@ -129,7 +129,6 @@ POWER = {
 """Power of 1/s by unit. Angles and positions lose digits as 1/s, everything that
 follows from them as 1/s^2.
 """
-_UNITS_OF_FORCES = ("N", "N m", "W")
 OF_THE_COMMAND = {
     bar: frozenset(
         (
@@ -197,7 +196,7 @@ def find_condition(quantity: str, linkage: FourBar, formulas: Solution) -> Array
         # a stroke commands the bar as far as its cylinder has a lever
         return np.full(len(formulas), np.asarray(formulas.at.condition) ** POWER[unit])
     condition = find_lever(linkage, bar) * formulas.condition ** POWER[unit]
-    of_force = unit in _UNITS_OF_FORCES
+    of_force = unit in ("N", "N m", "W")
     if formulas.stroke is not None and (of_force or quantity in _OF_DIRECTION):
         condition *= np.minimum(formulas.stroke / max(linkage.lengths), 1.0)
     if of_force:
