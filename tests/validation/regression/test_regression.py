@@ -20,7 +20,7 @@ from pytest import fixture, mark, raises
 from fourbar import Motion, Sweep, dump, load
 from fourbar.errors import BAD_INPUT, FAILED, HOLDS
 from fourbar_validation.cli import status
-from fourbar_validation.compare.results_file import ResultsWriter
+from fourbar_validation.compare.results_file import write_tables
 from fourbar_validation.compare.rows import FAILS, REFUSES
 from fourbar_validation.compare.tolerance import EQUIVALENCE, FULL_ACCURACY, ErrorBound
 from fourbar_validation.engines import free_body, guests, limits, registry
@@ -203,7 +203,7 @@ def test_a_damaged_table_is_one_line_and_nothing_is_written(
     file = kept / HISTORY
     contents = file.read_bytes()
     run = saved("later", changed(error=2e-15), about=replace(HERE, date="later"))
-    with ResultsWriter(tmp_path) as columns:
+    with write_tables(tmp_path) as columns:
         columns.add([ROW])
     # a bit of a number, which the checksum of its page shows
     place = contents.index(struct.pack("<d", ROW.error))
@@ -284,7 +284,7 @@ def test_options_of_a_run_that_would_do_nothing_are_refused_before_it(
 
 def test_a_run_with_too_many_rows_for_a_text_is_read_from_its_columns(tmp_path):
     """No greatest error is NaN by the columns."""
-    with ResultsWriter(tmp_path) as columns:
+    with write_tables(tmp_path) as columns:
         columns.add([ROW, changed(quantity="watch", error=math.nan, verdict=FAILS)])
     runs = []
     for unlinked in ("run.json", TABLE):
@@ -786,7 +786,7 @@ def test_what_is_too_long_for_a_text_and_a_history_is_compared_and_accepted(
     old, new = tmp_path / "old", tmp_path / "new"
     for folder, times in ((old, 1.0), (new, 1e3)):
         folder.mkdir()
-        with ResultsWriter(folder) as columns:
+        with write_tables(folder) as columns:
             for k in range(101):
                 error = 1e-9 * (1.0 + k * (times - 1.0))
                 name = f"random-0-{k:09d}"

@@ -4,14 +4,13 @@ The columns are those of `fourbar_validation.compare.rows.Row`, sorted by scene,
 setting and quantity; both files are written as the tasks are read.
 """
 
-import math
 import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from fourbar.writing import name_file
 from fourbar_validation.compare.rows import (
@@ -41,47 +40,19 @@ CSV_ROWS = 1_000_000
 
 
 class ResultsWriter:
-    """Writer of both files, which are complete at the end of a `with`.
+    """Writer of the rows of both files, as `write_tables` opens them."""
 
-    Neither file exists if the writer fails.
-    """
-
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out: Path, text: IO[str], columns: Any) -> None:
         self.out = out
         self.first_lines: dict[str, int] = {}
         """The line of results.csv at which each scene starts."""
         self._line = 2
+        self._text = text
+        self._columns = columns
         self._waiting: list[Any] = []
         """Arrow tables that wait to be a row group. Rows themselves would take five
         times the memory.
         """
-        self._files = ExitStack()
-
-    def __enter__(self) -> "ResultsWriter":
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        kinds = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
-        self._schema = pa.schema(
-            [(field.name, kinds[field.type]) for field in fields(Row)]  # type: ignore[index]
-        )
-        self._text, self._columns = (
-            self.out / f".results.{kind}.part" for kind in ("csv", "parquet")
-        )
-        with self._files:
-            self._files.enter_context(
-                name_file(self.out / "results.csv")
-            )  # a failure on closing is named too
-            self._csv = self._files.enter_context(
-                self._text.open("w", encoding="utf-8", newline="")
-            )
-            self._files.enter_context(name_file(self.out / "results.parquet"))
-            self._parquet = self._files.enter_context(
-                pq.ParquetWriter(self._columns, self._schema)
-            )
-            self._csv.write(write_rows([]))
-            self._files = self._files.pop_all()
-        return self
 
     def add(self, rows: Sequence[Row]) -> None:
         """Add the rows that come next, and keep them until they fill a row group."""
@@ -91,40 +62,73 @@ class ResultsWriter:
             if self._line <= CSV_ROWS:
                 self.first_lines.setdefault(row.scene, self._line)
             self._line += 1
-        if rows:
-            # NaN is no number: as null no greatest error is NaN by it
-            columns = [
-                pa.array([getattr(row, name) for row in rows], kind, from_pandas=True)
-                for name, kind in zip(RESULT_COLUMNS, self._schema.types, strict=True)
-            ]
-            self._waiting.append(pa.table(columns, schema=self._schema))
+        schema = self._columns.schema
+        # NaN is no number: as null no greatest error is NaN by it
+        columns = [
+            pa.array([getattr(row, name) for row in rows], kind, from_pandas=True)
+            for name, kind in zip(RESULT_COLUMNS, schema.types, strict=True)
+        ]
+        self._waiting.append(pa.table(columns, schema=schema))
         if self._line <= CSV_ROWS:
             with name_file(self.out / "results.csv"):
-                self._csv.write(write_rows(rows).partition("\n")[2])
+                self._text.write(write_rows(rows).partition("\n")[2])
         if sum(map(len, self._waiting)) >= GROUP_ROWS:
-            self._write_group()
+            self.write_group()
 
-    def _write_group(self) -> None:
+    def write_group(self) -> None:
+        """Write the rows that wait as a row group."""
         import pyarrow as pa
 
-        group = pa.concat_tables(self._waiting).combine_chunks()
-        with name_file(self.out / "results.parquet"):
-            self._parquet.write_table(group)
-        self._waiting.clear()
+        if self._waiting:
+            group = pa.concat_tables(self._waiting).combine_chunks()
+            with name_file(self.out / "results.parquet"):
+                self._columns.write_table(group)
+            self._waiting.clear()
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Put both in place, the text only where it is not too long."""
-        with self._files:
-            if kind is None and self._waiting:
-                self._write_group()
-        if kind is not None:
-            return
-        os.replace(self._columns, self.out / "results.parquet")
-        if self._line <= CSV_ROWS:
-            os.replace(self._text, self.out / "results.csv")
-        else:
-            self._text.unlink()
-            (self.out / "results.csv").unlink(missing_ok=True)
+    def finish(self) -> None:
+        """Write the last rows; a text that is too long is emptied, and not kept."""
+        self.write_group()
+        if self._line > CSV_ROWS:
+            self._text.truncate(0)
+
+
+@contextmanager
+def write_tables(out: Path) -> Iterator[ResultsWriter]:
+    """Write both files, which are complete at the end of a `with`.
+
+    Neither file exists if the writer fails.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    kinds: dict[Any, Any] = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
+    schema = pa.schema([(field.name, kinds[field.type]) for field in fields(Row)])
+    with (
+        draft_file(out / "results.csv") as text,
+        draft_file(out / "results.parquet") as table,
+        pq.ParquetWriter(table, schema) as columns,
+        text.open("w", encoding="utf-8", newline="") as lines,
+    ):
+        lines.write(write_rows([]))
+        writer = ResultsWriter(out, lines, columns)
+        yield writer
+        writer.finish()
+
+
+@contextmanager
+def draft_file(path: Path) -> Iterator[Path]:
+    """Yield where a file, however long, is drafted.
+
+    The file is in place once it is complete, and is removed if it is empty.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    with name_file(path):
+        try:
+            yield draft
+            if draft.stat().st_size:
+                os.replace(draft, path)
+        finally:
+            draft.unlink(missing_ok=True)
 
 
 def read_columns(path: Path) -> Iterator[Row]:
@@ -145,20 +149,26 @@ def read_frame(path: Path) -> "DataFrame":
 
 
 def _read_cells(path: Path) -> Iterator[list[list[Any]]]:
-    """Read the columns that make a row, some thousands of rows at a time.
-
-    Words that recur are kept once.
-    """
+    """Read the columns that make a row, some thousands of rows at a time."""
     for batch in _read_batches(path, COLUMN_TYPES):
-        words: dict[str, str] = {}
         yield [
-            (
-                [math.nan if cell is None else cell for cell in column.to_pylist()]
-                if kind is float
-                else _read_words(column, words)
-            )
+            column.to_numpy(zero_copy_only=False).tolist()
+            if kind is float
+            else _read_words(column)
             for column, kind in zip(batch, COLUMN_TYPES.values(), strict=True)
         ]
+
+
+def _read_words(column: Any) -> list[str]:
+    """Read the cells of a column of indices and words; words that recur are kept once.
+
+    Raises ValueError for a cell that is longer than LONGEST_CELL.
+    """
+    words = column.dictionary.to_pylist()
+    if max(map(len, words), default=0) > LONGEST_CELL:
+        raise ValueError("a cell is too long")
+    words = [sys.intern(escape_controls(read_cell_text(word))) for word in words]
+    return [words[index] for index in column.indices.to_pylist()]
 
 
 def count_rows(path: Path) -> int:
@@ -181,26 +191,14 @@ def _read_batches(path: Path, columns: Iterable[str]) -> Iterator[list[Any]]:
 
     names = list(columns)
     texts = [name for name in names if COLUMN_TYPES[name] is not float]
-    with ExitStack() as files:
-        if path.suffix == ".parquet":
-            table = files.enter_context(pq.ParquetFile(path, read_dictionary=texts))
-            batches = table.iter_batches(BATCH_ROWS, columns=names)
-        else:
-            word = pa.dictionary(pa.int32(), pa.string())
-            kinds = {name: word if name in texts else pa.float64() for name in names}
-            wanted = csv.ConvertOptions(column_types=kinds, include_columns=names)
-            lines = csv.ParseOptions(newlines_in_values=True)
-            batches = files.enter_context(csv.open_csv(path, None, lines, wanted))
-        for batch in batches:
-            yield [batch.column(name) for name in names]
-
-
-def _read_words(column: Any, words: dict[str, str]) -> list[str]:
-    known = []
-    for word in column.dictionary.to_pylist():
-        if len(word) > LONGEST_CELL:
-            raise ValueError(f"a cell of {len(word)} characters")
-        if word not in words:
-            words[word] = sys.intern(escape_controls(read_cell_text(word)))
-        known.append(words[word])
-    return [known[index] for index in column.indices.to_pylist()]
+    if path.suffix == ".parquet":
+        with pq.ParquetFile(path, read_dictionary=texts) as table:
+            for batch in table.iter_batches(BATCH_ROWS, columns=names):
+                yield [batch.column(name) for name in names]
+        return
+    word = pa.dictionary(pa.int32(), pa.string())
+    kinds = {name: word if name in texts else pa.float64() for name in names}
+    wanted = csv.ConvertOptions(column_types=kinds, include_columns=names)
+    lines = csv.ParseOptions(newlines_in_values=True)
+    with csv.open_csv(path, None, lines, wanted) as batches:
+        yield from (batch.columns for batch in batches)

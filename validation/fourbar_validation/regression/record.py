@@ -18,8 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 from fourbar.errors import InputError
 from fourbar.linkage import record
-from fourbar.writing import name_file, write_text
-from fourbar_validation.compare.results_file import count_rows, read_columns, read_frame
+from fourbar.writing import write_text
+from fourbar_validation.compare.results_file import (
+    count_rows,
+    draft_file,
+    read_columns,
+    read_frame,
+)
 from fourbar_validation.compare.rows import Row, escape_controls, read_cell_text
 from fourbar_validation.compare.tolerance import SIMULATED, K
 from fourbar_validation.engines.guests import Guest
@@ -376,19 +381,3 @@ def is_half_accepted(run: Recorded, target: Path) -> bool:
     except InputError:
         return True
     return False
-
-
-@contextmanager
-def draft_file(path: Path) -> Iterator[Path]:
-    """Yield where a file, however long, is drafted.
-
-    The file is in place once it is complete, and is removed if it is empty.
-    """
-    draft = path.with_name(f".{path.name}.part")
-    with name_file(path):
-        try:
-            yield draft
-            if draft.stat().st_size:
-                os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)

@@ -10,7 +10,11 @@ from typing import Any
 
 from fourbar.errors import InputError
 from fourbar.writing import write_text
-from fourbar_validation.compare.results_file import ResultsWriter, read_columns
+from fourbar_validation.compare.results_file import (
+    draft_file,
+    read_columns,
+    write_tables,
+)
 from fourbar_validation.compare.rows import (
     FAILS,
     FORMULAS,
@@ -32,7 +36,6 @@ from fourbar_validation.regression.record import (
     PARQUET_FILE,
     Recorded,
     describe_run,
-    draft_file,
     open_run,
     write_about,
 )
@@ -183,7 +186,7 @@ def _collect_tasks(
     Return each scene's first line.
     """
     with (
-        ResultsWriter(out) as columns,
+        write_tables(out) as columns,
         draft_file(out / OUTPUT) as printed,
         printed.open("w", encoding="utf-8", newline="") as output,
         draft_file(out / "timings.csv") as timed,
