@@ -36,12 +36,13 @@ from fourbar_validation.regression.rules import (
 from fourbar_validation.regression.scenes import (
     SceneChange,
     find_renamed,
+    list_changed,
     list_scene_changes,
 )
 from fourbar_validation.report.words import NUMBERS_IN_A_REASON
 
 if TYPE_CHECKING:
-    from pandas import DataFrame, Series
+    from pandas import DataFrame
 
 FREE_ROUND_OFFS = K
 """Errors of an exact comparison move freely by this many eps/condition: another
@@ -60,11 +61,6 @@ MOST_ONE_BY_ONE = 50
 """Scenes and engines listed by name that were not run or not compared. The others are
 counted.
 """
-EXACT_SETTING = "exact"
-"""Setting of an engine that is held to round-off, and sees what is wrong by more."""
-
-_HELD_TO = tuple(bound.cause for bound in (EQUIVALENCE, IDENTITY, SIMULATED))
-"""Beginnings of the reasons that say what is allowed, and not what went wrong."""
 
 
 class Kind(StrEnum):
@@ -92,12 +88,6 @@ WHOLE = (Kind.ENGINE_GONE, Kind.SCENE_GONE, Kind.REFUSED)
 """Kinds of what is missing as a whole, which is named once and not row by row."""
 _DISAGREEING = (Kind.VERDICT_WORSE, Kind.NEW_FAILURE, Kind.WORSE)
 REGRESSIONS = (*WHOLE, *_DISAGREEING, Kind.GONE)
-_WITH_A_CAUSE = (
-    Kind.VERDICT_WORSE,
-    Kind.VERDICT_BETTER,
-    Kind.NEW_FAILURE,
-    Kind.STILL_FAILS,
-)
 
 
 @dataclass(slots=True)
@@ -138,11 +128,6 @@ class Differences:
         return lines.sort_values(
             "kind", key=lambda kinds: kinds.map([*Kind].index), kind="stable"
         )
-
-    @property
-    def kinds(self) -> "Series[int]":
-        """Return how many rows there are of each kind."""
-        return self.table.kind.value_counts().reindex([*Kind], fill_value=0)
 
     @property
     def regressed(self) -> int:
@@ -237,7 +222,8 @@ class Differences:
     def sentences(self) -> list[str]:
         """Say who disagrees, and in how many scenes; the most frequent first."""
         lines = self.table
-        exact = (lines.setting == EXACT_SETTING) & (lines.engine != FORMULAS)
+        # an engine that is held to round-off sees what is wrong by more
+        exact = (lines.setting == "exact") & (lines.engine != FORMULAS)
         exact &= lines[_BOTH_VERDICTS].isin(COMPARED_VERDICTS).any(axis=1)
         of_scene = lines[exact].groupby("scene").engine.agg(set)
         worse = lines[lines.kind.isin(_DISAGREEING)].groupby("scene").engine.agg(set)
@@ -447,12 +433,15 @@ def _classify_rows(
     ]
     conditions_of, kinds = zip(*choices, strict=True)
     table["kind"] = np.select(conditions_of, kinds, same)
-    of_rule = table.reason_new.str.startswith(_HELD_TO)
+    # reasons that say what is allowed, and not what went wrong
+    causes = tuple(bound.cause for bound in (EQUIVALENCE, IDENTITY, SIMULATED))
+    of_rule = table.reason_new.str.startswith(causes)
     table["reason_new"] = table.reason_new.mask(of_rule, "held to " + table.reason_new)
     came = (table.verdict_old + " -> ").where(in_old & (worse != 0), "")
-    table["cause"] = (came + table.verdict_new + ": " + table.reason_new).where(
-        table.kind.isin(_WITH_A_CAUSE), ""
-    )
+    caused = [Kind.VERDICT_WORSE, Kind.VERDICT_BETTER]
+    caused += [Kind.NEW_FAILURE, Kind.STILL_FAILS]
+    cause = came + table.verdict_new + ": " + table.reason_new
+    table["cause"] = cause.where(table.kind.isin(caused), "")
     table["fails"] = fails
     table["since"] = ""
     scenes = "scene " + table.scene
@@ -462,8 +451,8 @@ def _classify_rows(
         Kind.REFUSED: scenes + " is newly refused by " + table.engine,
         Kind.NOT_RUN: table.engine.where(table.scene.isin(table.scene[in_new]), scenes),
     }
-    for kind, names in told.items():
-        table["why"] = table.why.mask(table.kind == kind, names)
+    of_kinds = [table.kind == kind for kind in told]
+    table["why"] = np.select(of_kinds, [*told.values()], table.why)
     growth = new / np.fmax(old, table.round_off)
     table["grown"] = growth.where(in_old & in_new, 1.0)
 
@@ -489,10 +478,6 @@ def _classify_missing(table: "DataFrame", before: About, after: About) -> Any:
     )
 
 
-_NOT_SURROUNDINGS = {"suite", "scenes of", "chosen", "guests"}
-"""Settings that say what was asked for, and not with what."""
-
-
 def _list_surroundings(old: About, new: About) -> list[tuple[str, str, str]]:
     """List what the runs were made with if it differs: what, old and new."""
     before, after = (
@@ -500,9 +485,7 @@ def _list_surroundings(old: About, new: About) -> list[tuple[str, str, str]]:
         | about.settings
         for about in (old, new)
     )
-    pairs = (
-        (what, before.get(what) or "not recorded", after.get(what) or "not recorded")
-        for what in dict.fromkeys((*before, *after))
-        if what not in _NOT_SURROUNDINGS
-    )
-    return [pair for pair in pairs if pair[1] != pair[2]]
+    # what was asked for is no surrounding
+    left_out = ("suite", "scenes of", "chosen", "guests")
+    changed = list_changed(before, after, "not recorded")
+    return [entry for entry in changed if entry[0] not in left_out]

@@ -9,7 +9,6 @@ import hashlib
 import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +138,11 @@ def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
     here = before.describe()
     if runs.empty:
         return f"is not in {here}"
-    names = [*starmap(_name_run, runs.index)]
+    names = [
+        f"the run of {date[:19].replace('T', ' ')}"
+        + f" at commit {commit}" * bool(commit)
+        for date, commit in runs.index
+    ]
     verb = "answered" if quantity == "all" else "held"
     if runs.index[-1] != (before.about.date, before.about.commit):
         end = "failed" if runs.iloc[-1] else verb
@@ -151,13 +154,6 @@ def _write_since(lines: "DataFrame", quantity: str, before: Recorded) -> str:
         return f"failed too in {here}" + many * (len(runs) > 1)
     last = np.flatnonzero(~runs)[-1]
     return f"has not {verb} since {names[last + 1]}; it {verb} in {names[last]}"
-
-
-def _name_run(date: str, commit: str) -> str:
-    """Name a run by its time and commit."""
-    return f"the run of {date[:19].replace('T', ' ')}" + f" at commit {commit}" * bool(
-        commit
-    )
 
 
 def draw_row(history: "DataFrame", row: Any) -> str:

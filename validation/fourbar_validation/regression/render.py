@@ -1,5 +1,6 @@
 """Differences as text, Markdown, HTML and JUnit XML: what fails comes first."""
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -34,7 +35,8 @@ def write_verdict(diff: Differences) -> str:
 
     What else moved, and the counts of the new run, follow.
     """
-    counts = [f"{count} {kind}" for kind, count in diff.kinds.items() if count]
+    counted = Counter(diff.table.kind)
+    counts = [f"{counted[kind]} {kind}" for kind in Kind if counted[kind]]
     many = diff.regressed
     if diff.weakened:
         counts.insert(0, f"{write_count(len(diff.weakened), 'rule')} weaker")

@@ -11,6 +11,7 @@ from fourbar.linkage import record
 from fourbar_validation.compare.tolerance import IDENTITY, ErrorBound, K
 from fourbar_validation.engines.limits import BOUNDARIES
 from fourbar_validation.engines.registry import Engine
+from fourbar_validation.regression.scenes import list_changed
 
 Rules = dict[str, dict[str, str]]
 """What stands under each name, as entries of text."""
@@ -78,10 +79,10 @@ def list_weakened(old: Mapping[str, Mapping[str, str]], new: Rules) -> list[Weak
     a reason or a boundary that is another one is weaker until somebody has accepted it.
     """
     weakened = [
-        Weakening(name, what, old[name][what], new[name][what])
+        Weakening(name, what, before, after)
         for name in old.keys() & new.keys()
-        for what in old[name].keys() & new[name].keys()
-        if old[name][what] != new[name][what] and _is_weaker(what, old[name], new[name])
+        for what, before, after in list_changed(old[name], new[name], "")
+        if before and after and _is_weaker(what, old[name], new[name])
     ]
     return sorted(
         weakened,

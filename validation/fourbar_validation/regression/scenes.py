@@ -4,7 +4,7 @@ Two runs are compared where these are the same.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from fourbar.errors import FourBarError
@@ -19,8 +19,6 @@ _MOST_DESCRIBED = 2000
 """Scenes that a record describes, one or two kB each. Random linkages follow from their
 seed.
 """
-_NO_QUESTION = ("title", "source", "pictures")
-"""Entries of a scene file that change no number."""
 POSITION_KEYS = ("motion.theta_2", "motion.free.steps", "motion.law.steps")
 """Entries that say at which positions the same question is put."""
 
@@ -47,7 +45,7 @@ def describe_changes(scene: Scene) -> dict[str, str]:
         entries = tomllib.loads(dump(scene))
     except FourBarError:  # a scene that no file can state
         return {"scene": repr(scene)}
-    for name in _NO_QUESTION:
+    for name in ("title", "source", "pictures"):  # they change no number
         entries.pop(name, None)
     return dict(_flatten_entries("", entries))
 
@@ -101,13 +99,13 @@ def find_renamed(
 
     The other run does not have the name; old name to new name.
     """
-    names: dict[str, list[str]] = {}
-    for name in sorted(new.keys() - old.keys(), reverse=True):
-        names.setdefault(repr(sorted(new[name].items())), []).append(name)
+    added = sorted(new.keys() - old.keys())
     renamed = {}
     for name in sorted(old.keys() - new.keys()):
-        if same := names.get(repr(sorted(old[name].items()))):
-            renamed[name] = same.pop()
+        same = next((other for other in added if new[other] == old[name]), None)
+        if same is not None:
+            added.remove(same)
+            renamed[name] = same
     return renamed
 
 
@@ -118,12 +116,17 @@ def list_scene_changes(
     """List the scenes of both runs that ask something else now."""
     changes = []
     for name in sorted(old.keys() & new.keys()):
-        runs = (old[name], new[name])
-        stated = (
-            (key, *(run.get(key, "not stated") for run in runs))
-            for key in runs[0] | runs[1]
-        )
-        entries = tuple(one for one in stated if one[1] != one[2])
+        entries = tuple(list_changed(old[name], new[name], "not stated"))
         if entries:
             changes.append(SceneChange(name, entries))
     return changes
+
+
+def list_changed(
+    old: Mapping[str, str], new: Mapping[str, str], missing: str
+) -> Iterator[tuple[str, str, str]]:
+    """List the entries that differ: key, old and new; `missing` stands for none."""
+    for key in dict.fromkeys((*old, *new)):
+        before, after = (entries.get(key) or missing for entries in (old, new))
+        if before != after:
+            yield key, before, after
