@@ -16,7 +16,7 @@ from fourbar.effects import Flywheel
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
 from fourbar_validation.check.judge_table import Judge, JudgedColumn
-from fourbar_validation.check.variants import Mistake, drop_remainder, solve_other
+from fourbar_validation.check.wrong_scenes import Mistake, drop_remainder, solve_other
 from fourbar_validation.compare.bodies import BodyMotion, pose, stack_components
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
 from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving

@@ -68,11 +68,6 @@ class Judgement(Judge):
                 return [one._replace(complete=one.complete and is_all) for one in found]
         return []
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is to be said of the table, and of what friction holds."""
-        return (*self.table.notes, *self.describe_held())
-
     @cached_property
     def differing(self) -> list[Discrepancy]:
         """The findings that do not agree, though digits are left to judge by."""
@@ -187,11 +182,6 @@ class Judgement(Judge):
             f"{write_count(digits, 'digit')} of {', '.join(names)}"
             for digits, names in sorted(fewest.items())
         )
-
-    def is_explained(self) -> bool:
-        """Return whether the explanations account for every quantity that differs."""
-        explained = (each.quantities for each in self.explanations)
-        return {each.quantity for each in self.differing} <= set().union(*explained)
 
 
 def write_judgement_json(judgement: Judgement) -> str:
@@ -361,7 +351,7 @@ def check_command(
 def show_judgement(judgement: Judgement, name: str) -> None:
     """Print what differs, what explains it, and the count."""
     table = judgement.table
-    for note in judgement.notes:
+    for note in (*table.notes, *judgement.describe_held()):
         print_sentence(note)
     for why in dict.fromkeys(table.left_out.values()):
         headings = [one for one, reason in table.left_out.items() if reason == why]
@@ -388,7 +378,8 @@ def show_judgement(judgement: Judgement, name: str) -> None:
         print_sentence(f"looks like: {explanation.text} (explains {extent})")
     power = judgement.agreed_power
     if differing:
-        if not judgement.is_explained():
+        explained = {one for each in judgement.explanations for one in each.quantities}
+        if not explained.issuperset(counted):
             print_sentence(judgement.describe_unexplained())
         elif not any(one.complete for one in judgement.explanations):
             print_sentence("these together explain all of it")

@@ -21,16 +21,15 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import find_unit_of_quantity
 from fourbar.studies.keys import replace_numbers
 from fourbar_validation.check.calculated import join
-from fourbar_validation.check.judge_table import Judge, JudgedColumn
+from fourbar_validation.check.judge_table import Judge, JudgedColumn, compute_column
 from fourbar_validation.check.theirs import OTHER_UNITS
-from fourbar_validation.check.variants import (
+from fourbar_validation.check.wrong_scenes import (
     Mistake,
-    compute_column,
     drop_remainder,
+    group_numbers,
     solve_other,
     state_all,
 )
-from fourbar_validation.check.wrong_scenes import group_numbers
 from fourbar_validation.compare.bodies import stack_components
 from fourbar_validation.compare.tolerance import divide, wrap_difference
 from fourbar_validation.scenes.bars import list_moving
@@ -68,8 +67,6 @@ NEAR_A_PLAIN_NUMBER = 1e-2
 """Relative distance within which a fitted number is tried as a plain one."""
 OFFSETS_TRIED = 72
 """Offsets of the crank angle that are tried before one is fitted, 5 deg apart."""
-_NEARLY_ONE = 1e-3
-"""Distance from 1 below which five digits do not tell a ratio from it."""
 PROMISING = 0.5
 """Mean misfit, as a part of each quantity's size and at most 1 of each number, below
 which an offset is fitted. Within 2.5 deg of the right one it is a few hundredths.
@@ -84,10 +81,6 @@ FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope."""
 _IN_VAIN = 0.9
 """Part of a misfit that a step leaves of it, above which a fit is given up."""
-_PARTS_OF_A_STEP = (1.0, 0.25)
-"""Parts of a step of which the first that is nearer is taken: towards a speed that is
-many times ours the slopes lead too far.
-"""
 
 
 def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -170,7 +163,8 @@ def _list_ratios(
     if numbers >= ENOUGH_NUMBERS:
         power = round(math.log10(near))
         yield f"every number is 10^{power} times ours", 10.0**power
-        digits = 5 if abs(near - 1.0) > _NEARLY_ONE else 12
+        # nearer to 1 five digits do not tell a ratio from it
+        digits = 5 if abs(near - 1.0) > 1e-3 else 12
         yield f"every number is {near:.{digits}g} times ours", near
 
 
@@ -180,9 +174,9 @@ def _try_exchanged(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mist
         column.quantity: compute_column(judge.right, column.quantity)
         for column in differing
     }
-    units = {name: (find_unit_of_quantity(name), right[name].shape) for name in right}
     for one, second in combinations(right, 2):
-        if units[one] == units[second]:
+        first_unit, unit = map(find_unit_of_quantity, (one, second))
+        if first_unit == unit and right[one].shape == right[second].shape:
             taken = {one: right[second], second: right[one]}
             text = f"{one} and {second} are exchanged"
             yield Mistake(text, taken.get, whole=False)
@@ -289,7 +283,8 @@ def _fit(
         left = _find_size(here - slope * change)
         if family.of_ours and step == 0 and left > _IN_VAIN * size:
             return None
-        for part in _PARTS_OF_A_STEP:
+        # towards a speed that is many times ours the slopes lead too far
+        for part in (1.0, 0.25):
             tried = number - part * change
             there = measure(tried)
             if _find_size(there) < size:
@@ -359,17 +354,18 @@ def _list_commands(
     misfits = shares.reshape(len(tried), -1).mean(axis=1)
     if misfits.min() < PROMISING:
         start = float(tried[np.argmin(misfits)])
-        yield _Family(math.degrees(start), partial(_turn, scene, at), of_ours=False)
 
+        def turn(offset: float) -> Mistake:
+            """Return the problem of angles that are counted from another zero, deg."""
+            text = (
+                f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
+                f" {at.commanded} {math.remainder(offset, 360.0):+.6g} deg is what they"
+                " solved"
+            )
+            angle = at.angle + math.radians(offset)
+            return solve_other(text, scene, at._replace(angle=angle))
 
-def _turn(scene: Scene, at: Command, offset: float) -> Mistake:
-    """Return the problem of angles that are counted from another zero, deg."""
-    text = (
-        f"the angle of the {BAR_NAMES[at.bar]} is measured from another zero:"
-        f" {at.commanded} {math.remainder(offset, 360.0):+.6g} deg is what they solved"
-    )
-    angle = at.angle + math.radians(offset)
-    return solve_other(text, scene, at._replace(angle=angle))
+        yield _Family(math.degrees(start), turn, of_ours=False)
 
 
 def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:

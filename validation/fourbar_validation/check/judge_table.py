@@ -4,13 +4,14 @@ A number gets its error, the allowed error, and what may explain the difference.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fourbar.effects import Table
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import MOVING_BARS
@@ -22,8 +23,11 @@ from fourbar.quantities import (
     SPRING_NAME,
     UNITS,
     Array,
+    find_derived,
 )
 from fourbar.scene import Command, Scene
+from fourbar.show.acting import list_springs
+from fourbar.show.derived import derive
 from fourbar.show.driving import begin_to_move, find_senses, leaves_range
 from fourbar.solution import Solution
 from fourbar.solving import solve
@@ -31,8 +35,7 @@ from fourbar_validation.check.row_commands import (
     RowCommands,
     find_row_commands,
 )
-from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable, name_quantity
-from fourbar_validation.check.variants import Predict, compute_column, open_tables
+from fourbar_validation.check.theirs import NOT_JUDGED, TheirTable
 from fourbar_validation.compare.scales import Scale, TermSizes
 from fourbar_validation.compare.tolerance import (
     EQUIVALENCE,
@@ -45,6 +48,8 @@ from fourbar_validation.compare.tolerance import (
     replace_zero_size,
 )
 
+Predict = Callable[[str], Array | None]
+"""Function of a quantity that returns the numbers of a mistake; None: it has none."""
 ONE_DIGIT = 0.1
 """Largest allowed error by which a digit is compared, as a part of the scale."""
 
@@ -105,9 +110,8 @@ class Discrepancy(NamedTuple):
     @property
     def agrees(self) -> bool:
         """Return whether it is within the allowed error, or a stated tolerance."""
-        if self.permitted is None:
-            return self.exact
-        return self.exact or (self.judged and self.difference <= self.permitted)
+        within = self.permitted is not None and self.difference <= self.permitted
+        return self.exact or (self.judged and within)
 
 
 def find_made_of(name: str, scene: Scene) -> str:
@@ -124,13 +128,30 @@ def find_made_of(name: str, scene: Scene) -> str:
     return f"{start}G{bar}" if bar in MOVING_BARS else f"{start}A"
 
 
+def compute_column(solution: Solution, name: str) -> Array | None:
+    """Compute a column from O2, (n,) or (n, 2); None if its stage was not evaluated."""
+    values: Array | None
+    if name in UNITS:
+        values = getattr(solution, name)
+        return values
+    if find_derived(name) is None:
+        of_stage = {"v_": solution.velocity, "a_": solution.acceleration}
+        stage = of_stage.get(name[:2], solution.points)
+        return stage.get(name[2:] if name[:2] in of_stage else name)
+    of_spring = SPRING_NAME.fullmatch(name)
+    if of_spring and int(of_spring[1]) >= len(list_springs(solution.scene)):
+        raise InputError("header", name, "does not exist in this scene")
+    values = derive(solution, name)
+    return values
+
+
 class JudgedColumn:
     """One quantity of a table, row by row against the formulas."""
 
     def __init__(self, judge: "Judge", key: str) -> None:
         self.judge = judge
         self.key = key
-        self.quantity = name_quantity(key)
+        self.quantity = key.strip("|")
         self.theirs, self._rounding, self._filled, self.unit = judge.table.columns[key]
         self.ours = self.take(judge.right)
         each = np.isfinite(self.theirs.reshape(len(self.theirs), -1))
@@ -147,6 +168,7 @@ class JudgedColumn:
         self.is_shared = self.quantity in (*PIN_FORCES, "guide_force")
         """True for a force that depends on how pins at rest share the friction."""
         self.is_drive = key == judge.drive.value
+        self._made_of = find_made_of(self.quantity, judge.scene)
 
     def measure(self, values: Array) -> Array:
         """Return the magnitudes of vectors where the table has magnitudes."""
@@ -212,11 +234,6 @@ class JudgedColumn:
         """Rows in which both have a number that is judged, (n,)."""
         where = self.answered & self.stated
         return where & ~self.judge.held if self.is_shared else where
-
-    @cached_property
-    def _made_of(self) -> str:
-        """Quantity whose size and condition the column has."""
-        return find_made_of(self.quantity, self.judge.scene)
 
     @cached_property
     def scale(self) -> Scale:
@@ -285,8 +302,7 @@ class JudgedColumn:
         """Error in parts of what is allowed, or of what a tolerance permits, (n,)."""
         error, allowed, apart = self.judged_right
         permitted = self.permitted(self.nearest)
-        times = error / allowed
-        return times if permitted is None else np.fmin(times, apart / permitted)
+        return np.fmin(error / allowed, apart / permitted)
 
     def compare(self, ours: Array) -> tuple[Array, Array, Array]:
         """Return (error, allowed, apart) of the table, each (n,).
@@ -305,11 +321,11 @@ class JudgedColumn:
         allowed = self.round_off * larger + self.rounding
         return divide(apart, self.divisor), allowed, apart
 
-    def permitted(self, ours: Array) -> Array | None:
+    def permitted(self, ours: Array) -> Array:
         """Return the difference that the given tolerance allows, (n,), in our unit."""
         tolerance = self.judge.tolerance
         if tolerance is None:
-            return None
+            return np.zeros(len(ours))
         rounding = self.rounding * self.divisor
         return tolerance.atol + tolerance.rtol * magnitude(ours) + rounding
 
@@ -326,9 +342,7 @@ class JudgedColumn:
         predicted = self._approach(predicted, self.judge.held)
         error, allowed, apart = self.compare(predicted)
         within = error <= np.maximum(times * allowed, left)
-        permitted = self.permitted(predicted)
-        if permitted is not None:
-            within |= apart <= permitted
+        within |= apart <= self.permitted(predicted)
         return bool(self.where.any() and within[self.where].all())
 
     def findings(self) -> Iterator[Discrepancy]:
@@ -337,8 +351,7 @@ class JudgedColumn:
         permitted = self.permitted(self.nearest)
         is_exact = (error <= self.exact) & (self.exact <= ONE_DIGIT)
         coarse = (allowed > ONE_DIGIT) & ~is_exact
-        if permitted is not None:
-            coarse &= allowed > divide(permitted, self.divisor) - self.rounding
+        coarse &= allowed > divide(permitted, self.divisor) - self.rounding
         table = self.judge.table
         for i in np.flatnonzero(self.where).tolist():
             theirs = np.atleast_1d(self.theirs[i])
@@ -351,7 +364,7 @@ class JudgedColumn:
                 float(error[i]),
                 float(allowed[i]),
                 float(apart[i]),
-                None if permitted is None else float(permitted[i]),
+                None if self.judge.tolerance is None else float(permitted[i]),
                 float(table.place.values[i]),
                 bool(coarse[i]),
             )
@@ -367,6 +380,25 @@ class JudgedColumn:
         allowed = np.where(error <= filled, np.minimum(allowed, filled), allowed)
         compared = allowed[self.where & (allowed <= ONE_DIGIT)]
         return float(compared.max()) if compared.size else math.nan
+
+
+class OpenTable(Table):
+    """Table whose factor is NaN, and no error, at an angle that it does not cover."""
+
+    def replace_outside(self, theta_2: Any) -> float:
+        """Return NaN: what acts there is not known."""
+        return math.nan
+
+
+def open_tables(scene: Scene) -> Scene:
+    """Let positions of hypotheses lie beyond the tables of loads, and have no force."""
+    loads = tuple(
+        load
+        if load.table is None
+        else replace(load, table=OpenTable(load.table.theta_2, load.table.factor))
+        for load in scene.loads
+    )
+    return replace(scene, loads=loads)
 
 
 class Judge:

@@ -6,7 +6,7 @@ The numbers that each would make are held against the table.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import chain, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,16 +24,15 @@ from fourbar_validation.check.fitted import (
     REVERSED,
     find_fitted,
 )
-from fourbar_validation.check.judge_table import Judge, JudgedColumn
-from fourbar_validation.check.row_commands import RowCommands, command_rates_beside
-from fourbar_validation.check.variants import (
+from fourbar_validation.check.judge_table import Judge, JudgedColumn, compute_column
+from fourbar_validation.check.row_commands import RowCommands, command_rates
+from fourbar_validation.check.wrong_scenes import (
     Mistake,
-    compute_column,
     drop_remainder,
+    list_wrong_scenes,
     solve_other,
     state_all,
 )
-from fourbar_validation.check.wrong_scenes import list_wrong_scenes
 
 _RPM = np.pi / 30.0
 """rad/s of one rev/min."""
@@ -52,11 +51,7 @@ _OF_SPEEDS = {
 }
 """The same of a speed."""
 _OTHER_BRANCH = "the other branch"
-_NEARLY_AT_REST = 1e-18
-"""Factor on a speed of which only the sign is left."""
 _CLOCKWISE = "counted clockwise, with all angles and torques"
-MOST_EXPLANATIONS = 5
-"""Explanations that are printed."""
 _WHERE = {
     " in the pin forces alone": PIN_FORCES,
     " in what drives alone": tuple({*FORCE_NAMES} - {*PIN_FORCES}),
@@ -66,7 +61,7 @@ _WHERE = {
 
 def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
     """List the mistakes that a column can have by itself."""
-    for text, change, kinds in _COLUMN_MISTAKES:
+    for text, (change, kinds) in _COLUMN_MISTAKES.items():
         predict = partial(_change_column, right, change, kinds)
         yield Mistake(text, predict, whole=False)
     rates = _ANGULAR[:1] if right.at.speed is None else _ANGULAR
@@ -100,31 +95,20 @@ def list_rates_of_rows(
 
     They are judged where the scene states its own.
     """
-    if judge.at.moves_stroke:
-        return
-    omega, alpha = judge.at.names[1:]
-    fields = {"speed": omega, "acceleration": alpha}
-    columns = judge.columns
-    stated: dict[str, Any] = {
-        field: columns[name].theirs for field, name in fields.items() if name in columns
+    fields = dict(zip(("speed", "acceleration"), judge.at.names[1:], strict=True))
+    table = replace(judge.stated, is_rounded=True)
+    stated = {
+        field: table.columns[name]
+        for field, name in fields.items()
+        if name in judge.columns
     }
-    if "speed" in stated and any(one.key not in fields.values() for one in differing):
+    others = any(one.key not in fields.values() for one in differing)
+    if "speed" in stated and others and not judge.at.moves_stroke:
         text = "each row has its own speed"
         if judge.scene.motion.law is None:
-            text += f": leave {omega} and {alpha} out of the scene"
-        near = tuple(one._replace(**stated) for one in (judge.at, *judge.rows.near))
-        rows = RowCommands(near[0])
-        table = replace(judge.stated, is_rounded=True)
-        for field in stated:
-            half = table.find_half(table.columns[fields[field]])
-            near = command_rates_beside(near, field, half)
-        logged = Judge(
-            judge.scene,
-            table,
-            judge.tolerance,
-            rows._replace(near=tuple(at for at in near if at is not rows.at)),
-            judge.slack,
-        )
+            text += f": leave {' and '.join(fields.values())} out of the scene"
+        rows = command_rates(RowCommands(judge.at, judge.rows.near), table, stated)
+        logged = Judge(judge.scene, table, judge.tolerance, rows, judge.slack)
 
         def predict(quantity: str) -> Array | None:
             values = compute_column(logged.right, quantity)
@@ -157,7 +141,7 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield change(_OTHER_BRANCH, branch=-at.branch)
     if at.speed is not None:
         yield change("no inertial forces (statics)", speed=0.0, acceleration=0.0)
-        slow = _NEARLY_AT_REST * at.speed
+        slow = 1e-18 * at.speed  # only the sign is left
         text = "no inertial forces (statics), with friction"
         yield change(text, speed=slow, acceleration=0.0).within(FORCE_NAMES)
         yield change(f"{omega} is reversed", speed=-at.speed)
@@ -193,32 +177,23 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
 
 
 _ANGULAR = ("theta", "omega", "alpha")
-_COLUMN_MISTAKES: tuple[
-    tuple[str, Callable[[Array], Array], str | tuple[str, ...]], ...
-] = (
-    (REVERSED, np.negative, ""),
-    ("the sign is lost: sizes alone", np.abs, ""),
-    ("degrees where radians were announced", np.degrees, _ANGULAR),
-    (
-        "degrees from -180 to 180 where radians were announced",
+_OTHER_END = "measured from the other end of the bar (half a turn off): theta_4 or"
+_OTHER_END += " theta_3 from B, theta_2 from A"
+_COLUMN_MISTAKES: dict[str, tuple[Any, Any]] = {
+    REVERSED: (np.negative, ""),
+    "the sign is lost: sizes alone": (np.abs, ""),
+    "degrees where radians were announced": (np.degrees, _ANGULAR),
+    "degrees from -180 to 180 where radians were announced": (
         lambda values: np.degrees(np.remainder(values + np.pi, TURN) - np.pi),
         "theta",
     ),
-    (
-        "degrees from 0 to 360 where radians were announced",
+    "degrees from 0 to 360 where radians were announced": (
         lambda values: np.degrees(np.remainder(values, TURN)),
         "theta",
     ),
-    (
-        (
-            "measured from the other end of the bar (half a turn off): theta_4 or"
-            " theta_3 from B, theta_2 from A"
-        ),
-        lambda values: values + np.pi,
-        "theta",
-    ),
-)
-"""Mistakes in a column: name, change of the values, and beginnings of the names of
+    _OTHER_END: (lambda values: values + np.pi, "theta"),
+}
+"""Change of the values by a mistake in a column, and beginnings of the names of
 quantities whose columns can have it.
 """
 
@@ -263,18 +238,24 @@ def explain(
     """
     least = ENOUGH_EXPLAINED * len(differing)
     found: list[Explanation] = []
-    for find in _SOURCES:
-        for mistake in find(judge, differing):
-            explained = _list_explained(judge, mistake, differing, least)
-            if explained:
-                explanation = Explanation(
-                    mistake.text,
-                    tuple(column.label for column in explained),
-                    len(explained) == len(differing),
-                    mistake.whole,
-                )
-                if not any(map(explanation.narrows, found)):
-                    found.append(explanation)
+    plainest_first = chain(
+        list_column_mistakes(judge.right),
+        list_hypotheses(judge.scene, judge.at),
+        list_rates_of_rows(judge, differing),
+        find_miscalculated(judge),
+        find_fitted(judge, differing),
+    )
+    for mistake in plainest_first:
+        explained = _list_explained(judge, mistake, differing, least)
+        if explained:
+            explanation = Explanation(
+                mistake.text,
+                tuple(column.label for column in explained),
+                len(explained) == len(differing),
+                mistake.whole,
+            )
+            if not any(map(explanation.narrows, found)):
+                found.append(explanation)
     plain = [one for one in found if not one.text.endswith(FITTED)]
     most = max((len(one.quantities) for one in plain if one.whole), default=0)
     found = [one for one in found if one in plain or len(one.quantities) > most]
@@ -288,7 +269,7 @@ def explain(
     unlike: dict[object, Explanation] = {}
     for one in sorted(found, key=rank):
         unlike.setdefault((one.text, one.quantities), one)
-    return list(unlike.values())[:MOST_EXPLANATIONS]
+    return list(unlike.values())[:5]
 
 
 def _list_explained(
@@ -337,13 +318,3 @@ def _list_explained(
     if all(column.explained(column.ours, *slack) for column in explained):
         return []
     return [column for column in judge.columns.values() if column in explained]
-
-
-_SOURCES: tuple[Callable[[Judge, list[JudgedColumn]], Iterator[Mistake]], ...] = (
-    lambda judge, differing: list_column_mistakes(judge.right),
-    lambda judge, differing: list_hypotheses(judge.scene, judge.at),
-    list_rates_of_rows,
-    lambda judge, differing: find_miscalculated(judge),
-    find_fitted,
-)
-"""Sources of mistakes, the plainest first."""

@@ -34,18 +34,17 @@ problem are allowed.
 """
 WORSE = "D"
 MISSING = "-"
-QUANTITIES_OF_GROUP = {
-    "reactions": (*PIN_FORCES, "guide_force"),
-    "torque": ("torque", "drive_force"),
-    "frequency": ("frequency",),
+_GROUPS = {
+    **dict.fromkeys((*PIN_FORCES, "guide_force"), "reactions"),
+    "torque": "torque",
+    "drive_force": "torque",
+    "frequency": "frequency",
 }
-"""Quantities of each group; every quantity that is not listed belongs to the motion."""
+"""Group of each quantity; every quantity that is not listed belongs to the motion."""
 SAFE = 8.0
 """Factor on the error bars of the formulas, which are estimates. Against many digits an
 answer is up to 6.6 of them off.
 """
-LARGEST_PROBLEM_FILE = 10**7
-"""Bytes."""
 
 
 class JudgedQuantity(NamedTuple):
@@ -84,7 +83,7 @@ def _read_document(
     path: str | Path, schema: str, objects: dict[str, str]
 ) -> dict[str, Any]:
     """Read an object of a schema, with what is said of entries that are no objects."""
-    text = read_text(path, "JSON file", LARGEST_PROBLEM_FILE)
+    text = read_text(path, "JSON file", 10**7)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -111,21 +110,16 @@ def judge_answers(
     errors = problem["errors"]
     if answered.get("at") is not None:
         answers, errors = _answer_at(problem, answered["at"])
+    theirs = answered["answers"]
     return [
-        _judge_quantity(
-            name,
-            answers[name],
-            errors[name],
-            answered["answers"].get(name),
-        )
+        _judge_quantity(name, answers[name], errors[name], theirs.get(name))
         for name in answers
     ]
 
 
 def _answer_at(
-    problem: dict[str, Any],
-    motion: Any,
-) -> tuple[dict[str, Any], dict[str, Any]]:
+    problem: dict[str, Any], motion: Any
+) -> tuple[dict[str, Array], dict[str, Array]]:
     """Evaluate the reference at the motion that an engine really made."""
     if problem["mechanism"] != "four-bar" or problem["ask"] != "answer":
         raise InputError(
@@ -136,10 +130,7 @@ def _answer_at(
     scene = protocol.scene_from_json(problem["scene"])
     scene, command = protocol.command_from_json(scene, problem["command"])
     made = protocol.read_answered_motion(motion, command)
-    answers, errors = collect_answers(solve(scene, "error", at=made))
-    return {name: values.tolist() for name, values in answers.items()}, {
-        k: v.tolist() for k, v in errors.items()
-    }
+    return collect_answers(solve(scene, "error", at=made))
 
 
 def collect_answers(solution: Solution) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -164,10 +155,7 @@ def _judge_quantity(
     errors: Any,
     theirs: Any,
 ) -> JudgedQuantity:
-    group = next(
-        (group for group, names in QUANTITIES_OF_GROUP.items() if name in names),
-        "motion",
-    )
+    group = _GROUPS.get(name, "motion")
     ours = np.atleast_1d(np.array(values, dtype=float))
     entries = theirs if isinstance(theirs, list) else [theirs]
     answered = np.full_like(ours, np.nan)
@@ -182,14 +170,10 @@ def _judge_quantity(
         size = float(magnitude(ours).max()) or 1.0
     off = compute_difference(name, ours, answered) / size
     bars = np.atleast_1d(np.array(errors, dtype=float)) / size
-    level = next(
-        (
-            level
-            for level, most in LEVELS.items()
-            if (off <= np.maximum(most, bars)).all()
-        ),
-        WORSE,
-    )
+    level = WORSE
+    for worse, most in reversed(LEVELS.items()):
+        if (off <= np.maximum(most, bars)).all():
+            level = worse
     worst = int(np.argmax(off))
     return JudgedQuantity(name, group, level, float(off[worst]), worst)
 

@@ -1,7 +1,7 @@
 """Commands at the rows of a table of results."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import product
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from fourbar.quantities import Array, Mask
 from fourbar.scene import Command, Scene, command
 from fourbar.solution import compute_times
 from fourbar.solving import solve
-from fourbar_validation.check.theirs import TheirTable
+from fourbar_validation.check.theirs import TheirColumn, TheirTable
 from fourbar_validation.compare.tolerance import EPS, divide, wrap_difference
 
 _AS_PRINTED = 4.0 * EPS
@@ -76,7 +76,7 @@ def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands
             place, speed, acceleration = law.at(time)
         if scene.motion.stroke is not None:
             return command(replace(scene, motion=scene.motion.replace(angle=place)))
-        at = _command_each(base, place, scene)
+        at = _command_each(base, place)
         return at._replace(speed=speed, acceleration=acceleration)
 
     # zeros at the ends of times may be left off
@@ -114,43 +114,59 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
         along = _follow_law(scene, table, base)
         if along is not None:
             return along
-    rates: tuple[str, ...] = ()
-    if not same if varies else scene.motion.speed is None:
-        rates = _list_stated_rates(scene, table, both=varies)
-    stated: dict[str, Any] = {
-        field: table.columns[rate].values
-        for field, rate in zip(("speed", "acceleration"), rates, strict=False)
-        if rate in table.columns
+    rates = scene.motion.names[1:]
+    needed = not same if varies else scene.motion.speed is None
+    fields = zip(("speed", "acceleration"), rates, strict=True)
+    stated = {
+        field: table.columns[rate]
+        for field, rate in fields
+        if needed and rate in table.columns
     }
-    base = base._replace(**stated)
+    if needed and varies and len(stated) < 2:
+        law = scene.motion.law is not None
+        time = f"a column time beside {scene.motion.commanded}, or " if law else ""
+        raise InputError(
+            "motion.law" if law else f"motion.{rates[0]}",
+            None,
+            "a table is judged along a law or listed speeds at the scene's own"
+            f" positions, all of them in its order; at others it needs {time}columns"
+            f" {' and '.join(rates)}",
+        )
+    if "speed" not in stated:
+        stated = {}
     if not commanded:
         found = RowCommands(base) if same else _find_by_another_bar(scene, table, base)
     else:
         table = table if same else _move_to_own(base.angle, table)
-        at = base if same else _command_each(base, table.places, scene)
+        at = base if same else _command_each(base, table.places)
 
         def command_at(shift: Array | float) -> Command:
             return at.as_doubles()._replace(angle=at.angle + shift)
 
         found = _command_rounded(table, command_at)._replace(at=at)
-    near = found.near or (found.at,)
-    for field in stated:
-        half = table.find_half(table.columns[rates[field == "acceleration"]])
-        near = command_rates_beside(near, field, half)
-    near = tuple(at for at in near if at is not found.at)
-    return found._replace(near=near, rates=rates)
+    if stated:
+        found = command_rates(found, table, stated)._replace(rates=rates)
+    return found
 
 
-def command_rates_beside(
-    near: tuple[Command, ...], field: str, half: Array
-) -> tuple[Command, ...]:
-    """Command the rows at both ends of the rounding of a speed or acceleration."""
-    if not half.any():
-        return near
-    return tuple(
-        at._replace(**{field: getattr(at, field) + end})
-        for at, end in product(near, (-half, half))
-    )
+def command_rates(
+    rows: RowCommands, table: TheirTable, stated: Mapping[str, TheirColumn]
+) -> RowCommands:
+    """Command rows at the speed or acceleration that a table states, and beside.
+
+    `stated`: columns by the field of a command.
+    """
+    numbers: dict[str, Any] = {field: rate.values for field, rate in stated.items()}
+    at, *near = (one._replace(**numbers) for one in (rows.at, *rows.near))
+    near = near or [at]
+    for field, rate in stated.items():
+        half = table.find_half(rate)
+        if half.any():
+            near = [
+                one._replace(**{field: getattr(one, field) + end})
+                for one, end in product(near, (-half, half))
+            ]
+    return rows._replace(at=at, near=tuple(one for one in near if one is not at))
 
 
 def _command_rounded(
@@ -180,33 +196,6 @@ def _find_strokes(scene: Scene, table: TheirTable, base: Command) -> RowCommands
         return command(replace(scene, motion=motion))
 
     return _command_rounded(table, command_at)
-
-
-def _list_stated_rates(
-    scene: Scene,
-    table: TheirTable,
-    both: bool,
-) -> tuple[str, ...]:
-    """List speed and acceleration of the command if the table states the speed.
-
-    Raises InputError where `both` are needed and not stated: the speed of a law, or of
-    a list, is known at the scene's own positions alone.
-    """
-    rates = scene.motion.names[1:]
-    if all(rate in table.columns for rate in rates[: 1 + both]):
-        return rates
-    if both:
-        names = " and ".join(rates)
-        law = scene.motion.law is not None
-        time = f"a column time beside {scene.motion.commanded}, or " if law else ""
-        raise InputError(
-            "motion.law" if law else f"motion.{rates[0]}",
-            None,
-            "a table is judged along a law or listed speeds at the scene's own"
-            f" positions, all of them in its order; at others it needs {time}columns"
-            f" {names}",
-        )
-    return ()
 
 
 def _follow_law(
@@ -242,7 +231,7 @@ def _follow_law(
         angle, speed, acceleration = law.at(time)
         on_law = fits(time) | (rounding > _ONE_PLACE)
         angle = np.where(on_law, angle, table.places)
-        at = _command_each(base, angle, scene)
+        at = _command_each(base, angle)
         return at._replace(speed=speed, acceleration=acceleration)
 
     fits_stated = np.abs(measure(stated)) <= rounding + _ONE_PLACE
@@ -299,9 +288,9 @@ def _find_last_that_holds(
     return inside
 
 
-def _command_each(base: Command, angle: Array, scene: Scene) -> Command:
-    """Command the angle of each row, at the speed of a command."""
-    branch = np.full(len(angle), scene.motion.branch, dtype=np.int8)
+def _command_each(base: Command, angle: Array) -> Command:
+    """Command the angle of each row, on the branch and at the speed of a command."""
+    branch = np.full(len(angle), base.branch[0])
     return Command(angle, branch, base.speed, base.acceleration, bar=base.bar)
 
 
@@ -361,9 +350,7 @@ def _find_by_another_bar(
             at = Command(places, branches, None, 0.0, bar=int(table.found_by[-1]))
             angle = solve(scene, "position", at=at)[base.commanded]
             angle = first + np.remainder(angle - first, TURN)
-            at = _command_each(base, angle, scene)._replace(
-                speed=None, acceleration=0.0
-            )
+            at = _command_each(base, angle)._replace(speed=None, acceleration=0.0)
             theirs = solve(scene, "position", at=at)[table.found_by]
             fits = np.abs(wrap_difference(theirs - places)) <= _ONE_PLACE
             found.append(np.where(fits, angle, np.nan))
@@ -388,6 +375,6 @@ def _find_by_another_bar(
         shifted = find(table.places + shift)
         away = np.nan_to_num(np.abs(shifted - angle), nan=np.inf)
         nearest = np.where(away[0] <= away[1], shifted[0], shifted[1])
-        return _command_each(base, nearest, scene)
+        return _command_each(base, nearest)
 
     return _command_rounded(table, command_at)

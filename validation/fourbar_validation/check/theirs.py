@@ -14,7 +14,6 @@ of a rounded angle changes.
 """
 
 import csv
-import io
 import math
 import re
 from collections.abc import Collection
@@ -51,11 +50,6 @@ NOT_JUDGED = {
     ),
 }
 """Columns of `fourbar analyze --csv` that are no answer, and why."""
-_BLANK = "blank"
-_COMMENT = ("#", "%", "//")
-"""Beginnings of a line that is a comment."""
-_COMMANDED_ANGLE = ("angle", "winkel", "antriebswinkel", "inputangle")
-"""Names of the angle that a scene commands, spelled as in _OTHER_NAMES."""
 _PLACES = ("theta_2", "theta_4", "theta_3")
 """Angles by which a row may be found where the commanded one has no column."""
 _OF_TORQUE = (
@@ -122,13 +116,6 @@ OTHER_UNITS = {
 another unit.
 """
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:[ ,'\u2019\u00a0\u202f]\d{3})+(?:\.\d+)?")
-_GERMAN_THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+")
-_TWO_TURNS = 4.0 * math.pi
-"""Angles beyond this many rad, all of them multiples of half a one, are degrees."""
-_MOST_DEGREES = 1e6
-"""Beyond this no angle is meant."""
-LARGEST_TABLE_FILE = 64 * 2**20
-"""Bytes; a table larger than this is not a hand-made comparison."""
 _HEADING = re.compile(
     r"\|?(?P<name>\w[\w /]*?)\|?\s*"
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\)|/ (?P<slash>.*))?"
@@ -190,9 +177,15 @@ class TheirTable:
 
         It is 0 in a column without _DECIMALS: somebody chose its numbers.
         """
+        halves = column.rounding
+        unit = 0.5 * column.unit.factor * (1.0 + EPS)
+        chosen = halves.min() > unit * 10.0**-_DECIMALS
         if self.is_rounded:
-            return column.rounding
-        return _find_rounding(column.rounding, column.unit)
+            return halves
+        if chosen:
+            return np.zeros_like(halves)
+        # a cell whose zeros were left off has the digits of the column
+        return np.where(halves <= unit * 10.0 ** (1 - _DECIMALS), halves, halves.min())
 
     @property
     def places(self) -> Array:
@@ -218,11 +211,6 @@ class TheirTable:
         return replace(self, columns=self.columns | drawn, notes=(*self.notes, note))
 
 
-def name_quantity(key: str) -> str:
-    """Name the quantity of a key of `TheirTable.columns`."""
-    return key.strip("|")
-
-
 def read_table(
     path: Path, commanded: str = "theta_2", points: Collection[str] = ()
 ) -> TheirTable:
@@ -233,7 +221,8 @@ def read_table(
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
-    text = read_text(path, "table", LARGEST_TABLE_FILE)
+    # a table larger than 64 MiB is not a hand-made comparison
+    text = read_text(path, "table", 64 * 2**20)
     try:
         return _read_columns(*_read_lines(text, path.name), commanded, points)
     except InputError as error:
@@ -258,14 +247,21 @@ def _read_columns(
             f"needs a column {commanded} (say {commanded} [deg] for degrees), the angle"
             f" of another bar, or the time; {_KNOWN}",
         )
-    _require_cells(len(headings), rows)
+    count = len(headings)
+    for line, cells in rows:
+        more = cells[count:]
+        if len(cells) < count or "".join(more).strip():
+            allowed = f"needs {count} cells"
+            if more:
+                allowed += "; with decimal commas, semicolons between them"
+            raise InputError(f"line {line}", cells, allowed)
     numbers = {}
     for name, (index, unit) in found.items():
         with suppress(InputError) if name == "time" != found_by else nullcontext():
             numbers[name] = _read_numbers(name, headings[index], unit, index, rows)
+    place = numbers[found_by]
     times = numbers.pop("time", None)
-    place = times if found_by == "time" else numbers.pop(found_by)
-    assert place is not None
+    numbers.pop(found_by, None)
     missing = np.isnan(place.values)
     if missing.any():
         line, cells = rows[int(np.argmax(missing))]
@@ -273,23 +269,28 @@ def _read_columns(
     if times is not None and np.isnan(times.values).any():
         times = None
     notes: tuple[str, ...] = ()
-    if place.unit.text == "rad" and not re.search(
-        r"[\[(]|/ ", headings[found[found_by][0]]
-    ):
-        place, notes = _read_degrees(found_by, place)
-    read_columns: dict[str, TheirColumn] = {}
+    is_stated = re.search(r"[\[(]|/ ", headings[found[found_by][0]])
+    if place.unit.text == "rad" and not is_stated and _are_degrees(place.values):
+        largest = np.abs(place.values).max()
+        text = (
+            f"{found_by} has no unit and goes to {largest:g}: it is read as degrees;"
+            f" write {found_by} [deg], or {found_by} [rad] if it is not"
+        )
+        notes = (text,)
+        in_degrees = Unit("deg", math.pi / 180.0)
+        place = _make_column(place.values, place.rounding, in_degrees)
+    columns: dict[str, TheirColumn] = {}
     blank = {}
     for name, column in numbers.items():
         if np.isnan(column.values).all():
-            blank[headings[found[name][0]]] = _BLANK
+            blank[headings[found[name][0]]] = "blank"
         else:
-            _enter_column(read_columns, name, column)
-    if not read_columns:
+            _enter_column(columns, name, column)
+    if not columns:
         wanted = " in place of blank cells" * bool(blank)
         raise InputError("header", headings, f"needs a result{wanted}; {_KNOWN}")
     lines = [line for line, _ in rows]
-    left_out |= blank
-    return TheirTable(place, read_columns, lines, left_out, notes, found_by, times)
+    return TheirTable(place, columns, lines, left_out | blank, notes, found_by, times)
 
 
 def _find_columns(
@@ -323,17 +324,6 @@ def _find_columns(
     return found, left_out
 
 
-def _require_cells(count: int, rows: list[tuple[int, list[str]]]) -> None:
-    """Raise InputError for a row with fewer cells, or with more that are not blank."""
-    for line, cells in rows:
-        more = cells[count:]
-        if len(cells) < count or "".join(more).strip():
-            allowed = f"needs {count} cells"
-            if more:
-                allowed += "; with decimal commas, semicolons between them"
-            raise InputError(f"line {line}", cells, allowed)
-
-
 def _read_numbers(
     name: str,
     heading: str,
@@ -352,32 +342,26 @@ def _read_numbers(
     values, half = numbers.T
     if name.endswith(("_x", "_y")) and heading.strip()[:3] in _REACTIONS:
         values = -values
-    half = np.where(np.isnan(values), 0.0, half)
+    column = _make_column(values, np.where(np.isnan(values), 0.0, half), unit)
+    return column._replace(unit=Unit("s", 1.0)) if name == "time" else column
+
+
+def _make_column(values: Array, half: Array, unit: Unit) -> TheirColumn:
+    """Return a column of numbers in a unit, and half a unit of their last digits."""
     factor = unit.factor
     filled = factor * fill_zeros(values, half)
-    if name == "time":
-        unit = Unit("s", 1.0)
     return TheirColumn(values * factor, half * factor, filled, unit)
 
 
-def _read_degrees(
-    name: str, column: TheirColumn
-) -> tuple[TheirColumn, tuple[str, ...]]:
-    """Read an angle without a unit as degrees if it can be nothing else."""
-    values = column.values
-    largest = float(np.abs(values).max())
-    if not _TWO_TURNS < largest < _MOST_DEGREES:
-        return column, ()
-    if np.any(np.abs(2.0 * values - np.round(2.0 * values)) > 1e-9):
-        return column, ()
-    factor = math.pi / 180.0
-    text = (
-        f"{name} has no unit and goes to {largest:g}: it is read as degrees; "
-        f"write {name} [deg], or {name} [rad] if it is not"
-    )
-    rounding = column.rounding * factor
-    column = TheirColumn(values * factor, rounding, rounding, Unit("deg", factor))
-    return column, (text,)
+def _are_degrees(angles: Array) -> bool:
+    """Return whether angles without a unit can be nothing but degrees.
+
+    They go beyond two turns in rad, and are multiples of half a degree.
+    """
+    largest = np.abs(angles).max()
+    halves = 2.0 * angles
+    in_range = 4.0 * math.pi < largest < 1e6  # beyond this no angle is meant
+    return bool(in_range and np.all(np.abs(halves - np.round(halves)) <= 1e-9))
 
 
 def _enter_column(
@@ -412,30 +396,15 @@ def fill_zeros(numbers: Array, halves: Array) -> Array:
     return np.where(np.isnan(numbers), 0.0, least[last])
 
 
-def _find_rounding(halves: Array, unit: Unit) -> Array:
-    """Find half a unit of the last digit of each place by which a row is found.
-
-    For a cell whose zeros were left off it is that of the column.
-    """
-    least = halves.min()
-    if least > 0.5 * unit.factor * 10.0**-_DECIMALS * (1.0 + EPS):
-        return np.zeros_like(halves)
-    return np.where(
-        halves <= 0.5 * unit.factor * 10.0 ** (1 - _DECIMALS) * (1.0 + EPS),
-        halves,
-        least,
-    )
-
-
 def _read_lines(
     text: str, name: str
 ) -> tuple[list[str], list[str], list[tuple[int, list[str]]]]:
     """Read the headings, the units under them, and rows with their line numbers."""
-    text = _remove_titles(_remove_comments(text))
-    header = next((line for line in text.splitlines() if line.strip()), "")
+    lines = _blank_titles(text.splitlines())
+    header = next(filter(str.strip, lines), "")
     delimiter = next((mark for mark in ";\t" if mark in header), ",")
+    reader = csv.reader((f"{line}\n" for line in lines), delimiter=delimiter)
     try:
-        reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
         numbered = [(reader.line_num, row) for row in reader if "".join(row).strip()]
     except csv.Error:
         raise InputError("table", name, "must be a CSV file") from None
@@ -445,69 +414,53 @@ def _read_lines(
             for line, cells in numbered[1:]
         ]
     units: list[str] = []
-    if len(numbered) > 1 and _is_unit_line(numbered[1][1]):
+    number = r"(?<![A-Za-z^*])(?<!\^-)[0-9]"
+    if len(numbered) > 1 and not any(re.search(number, one) for one in numbered[1][1]):
         units = numbered.pop(1)[1]
     if len(numbered) < 2:
         raise InputError("table", name, "needs a header and at least one row")
     return numbered[0][1], units, numbered[1:]
 
 
-def _remove_comments(text: str) -> str:
-    """Blank the lines that are comments.
+def _blank_titles(lines: list[str]) -> list[str]:
+    """Blank the comments, and lines of one cell above the first line of several.
 
-    The last one before the numbers may be the header.
+    The last comment before the numbers may be the header. A heading in quotes may go on
+    in the next line.
     """
-    lines = text.splitlines()
-    of_comment = [line.lstrip().startswith(_COMMENT) for line in lines]
-    first = next(
-        (i for i, line in enumerate(lines) if line.strip() and not of_comment[i]), 0
-    )
-    words = re.sub(r"\d[eE][-+]?\d", "", lines[first]) if lines else ""
-    has_header = re.search(r"[^\W\d_]", words)
-    for i, line in enumerate(lines):
-        if not of_comment[i]:
-            continue
-        header = i == first - 1 and not has_header
-        lines[i] = line.lstrip().lstrip("#%/ ") if header else ""
-    return "\n".join(lines) + "\n"
-
-
-def _remove_titles(text: str) -> str:
-    """Blank the lines of one cell above the first line of several.
-
-    A heading in quotes may go on in the next line.
-    """
-    lines = text.splitlines()
-    # what is quoted is in one cell; a quote that is left over is not closed here
-    plain = (re.sub('"[^"]*"', "x", line) for line in lines)
-    cells = ([*filter(str.strip, re.split("[,;\t]", line))] for line in plain)
-    several = (len(line) > 1 or '"' in "".join(line) for line in cells)
-    first = next((i for i, one in enumerate(several) if one), 0)
-    return "\n".join([*[""] * first, *lines[first:]]) + "\n"
+    plain = ["" if re.match(r"\s*(#|%|//)", line) else line for line in lines]
+    first = next((i for i, line in enumerate(plain) if line.strip()), 0)
+    words = re.sub(r"\d[eE][-+]?\d", "", "".join(plain[first : first + 1]))
+    if first and not re.search(r"[^\W\d_]", words):
+        plain[first - 1] = lines[first - 1].lstrip().lstrip("#%/ ")
+    for i, line in enumerate(plain):
+        # what is quoted is in one cell; a quote that is left over is not closed here
+        cells = re.split("[,;\t]", re.sub('"[^"]*"', "x", line))
+        if '"' in cells[-1] or len([*filter(str.strip, cells)]) > 1:
+            return [""] * i + plain[i:]
+    return plain
 
 
 def _read_comma(cell: str) -> str:
     """Read a decimal comma, with points between thousands, as a decimal point."""
     text = cell.strip()
-    if _GERMAN_THOUSANDS.fullmatch(text):
+    if re.fullmatch(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+", text):
         text = text.replace(".", "")
     return text.replace(",", ".")
 
 
-def _name_vector(name: str, points: Collection[str]) -> str:
-    """Name the vector whose magnitude or component a column has; "" if it has none."""
-    vector = name[:-2] if name.endswith(("_x", "_y")) else name
+def _find_quantity(name: str, points: Collection[str]) -> tuple[str, bool]:
+    """Return the quantity of a column by its name, and whether it is a vector.
+
+    The name may be that of a component. Without such a quantity it is "".
+    """
+    vector = re.sub("_[xy]$", "", name)
     derived = find_derived(vector)
-    of_vector = vector in points or vector in VECTORS
-    if of_vector or (derived is not None and derived.kind == "vector"):
-        return vector
-    return ""
-
-
-def _is_known(name: str, points: Collection[str]) -> bool:
-    """Return whether a column's name is that of a quantity."""
-    is_scalar = name in UNITS or find_derived(name) is not None
-    return is_scalar or bool(_name_vector(name, points))
+    is_derived = derived is not None and derived.kind == "vector"
+    if is_derived or vector in points or vector in VECTORS:
+        return vector, True
+    is_known = name in UNITS or name in NOT_JUDGED or find_derived(name) is not None
+    return name if is_known else "", False
 
 
 def _spell(name: str) -> str:
@@ -515,14 +468,6 @@ def _spell(name: str) -> str:
     plain = normalize("NFKC", name)  # of a digit below the line
     plain = plain.replace("θ", "theta").replace("ω", "omega").replace("α", "alpha")
     return re.sub(r"[\s_-]", "", plain.lower())
-
-
-def _is_unit_line(cells: list[str]) -> bool:
-    """Return whether a line under the header states units.
-
-    No cell of it contains a number.
-    """
-    return not any(re.search(r"(?<![A-Za-z^*])(?<!\^-)[0-9]", cell) for cell in cells)
 
 
 def _read_heading(
@@ -546,32 +491,31 @@ def _read_heading(
         unit = (stated or unit).strip()
         plain = match["name"] + (match["letter"] or "")
     name = _REACTIONS.get(plain[:3], plain[:3]) + plain[3:]
-    if not _is_known(name, points) and name not in NOT_JUDGED:
-        spelled = _spell(name)
-        name = _OTHER_NAMES.get(spelled, name)
-        if spelled in _COMMANDED_ANGLE:
-            name = commanded
+    if not _find_quantity(name, points)[0]:
+        angles = ("angle", "winkel", "antriebswinkel", "inputangle")
+        others = _OTHER_NAMES | dict.fromkeys(angles, commanded)
+        name = others.get(_spell(name), name)
     for meaning, its_unit in _BY_UNIT.get(_spell(plain), {}).items():
         if converts(unit, its_unit):
             name = meaning
             break
-    vector = _name_vector(name, points)
-    quantity = vector or name
+    quantity, is_vector = _find_quantity(name, points)
     if quantity in NOT_JUDGED:
         known = None
         if quantity == "time":
             with suppress(InputError):
                 known = _read_unit(heading, quantity, unit)
         return name, known, NOT_JUDGED[quantity]
-    if match is None or not _is_known(name, points):
-        return name, None, f"not a known column: {_KNOWN}"
-    key = f"|{name}|" if name == vector else name
+    not_known = f"not a known column: {_KNOWN}"
+    if match is None or not quantity:
+        return name, None, not_known
+    key = f"|{name}|" if is_vector and name == quantity else name
     try:
         return key, _read_unit(heading, quantity, unit), ""
     except InputError:
         if match["slash"] is None:
             raise
-        return name, None, f"not a known column: {_KNOWN}"  # a ratio
+        return name, None, not_known  # a ratio
 
 
 def _read_unit(heading: str, quantity: str, text: str) -> Unit:
@@ -580,12 +524,12 @@ def _read_unit(heading: str, quantity: str, text: str) -> Unit:
         return Unit(unit, 1.0)
     from fourbar.quantities.units import find_factor
 
-    plain = {_spell(name): name for name in OTHER_UNITS.get(unit, ())}
     try:
         return Unit(text, find_factor(unit, text))
     except InputError as error:
-        if (usual := plain.get(_spell(text))) is not None:
-            return Unit(text, find_factor(unit, usual))
+        for usual in OTHER_UNITS.get(unit, ()):
+            if _spell(usual) == _spell(text):
+                return Unit(text, find_factor(unit, usual))
         allowed = f"{text}: {error.allowed}"
         raise InputError("header", heading, allowed) from None
 

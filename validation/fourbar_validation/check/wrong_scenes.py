@@ -1,4 +1,7 @@
-"""Scenes that somebody may have solved in place of the one that was set.
+"""Mistakes as hypotheses, and scenes that somebody may have solved for the one set.
+
+A mistake in what was solved is another scene or another command, which the formulas
+solve as they solve the right one.
 
 A number of a scene, or all numbers under one name, may be left out or have another
 factor; inertia may count about another point; a load may act elsewhere.
@@ -6,21 +9,32 @@ factor; inertia may count about another point; a load may act elsewhere.
 
 import cmath
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from fourbar.effects import Gravity, Load
 from fourbar.effects.load import PLACES_OF_LOADS
-from fourbar.errors import InputError
+from fourbar.errors import FourBarError, InputError
 from fourbar.linkage import BAR_NUMBERS, MOVING_BARS
-from fourbar.scene import Scene
+from fourbar.quantities import COUPLE, LINE, Array
+from fourbar.scene import Command, Scene, StrokeOrigin
+from fourbar.solution import Solution, find_unit_of_quantity
+from fourbar.solving import solve
 from fourbar.studies.keys import list_entries, read_number, replace_numbers
+from fourbar_validation.check.judge_table import Predict, compute_column
 from fourbar_validation.compare.pins import resolve
 from fourbar_validation.engines.free_body_closure import cross_products
-from fourbar_validation.scenes.bars import list_moving
+from fourbar_validation.scenes.bars import list_moving, replace_bars
 
+_OF_FORMULAS = (*COUPLE[1:], *LINE[1:])
+"""Quantities that no wrong problem changes: an error and a range are the formulas'."""
+_TURNING = ("rad", "rad/s", "rad/s^2", "N m")
+"""Units of what is reversed where angles are counted clockwise."""
 _PLACE_UNITS = ("m", "rad")
 """Units of numbers that say where and in which direction something acts."""
 _DONE = {0.0: "left out", 2.0: "doubled", -1.0: "reversed"}
@@ -41,6 +55,102 @@ _GRAVITIES = (9.81, 9.80665, 9.8)
 """Gravity of textbooks and of simulators, m/s^2."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
+
+
+class Mistake(NamedTuple):
+    """A mistake as a hypothesis: what was done, and what the numbers become."""
+
+    text: str
+    predict: Predict
+    whole: bool = True
+    """True if it was made in the calculation and shows in every quantity; a wrong unit
+    of a column shows in that column alone.
+    """
+    times: float = 1.0
+    """Factor on the allowed error. A number that was fitted to rounded ones carries
+    their rounding once more.
+    """
+    left: float = 0.0
+    """Part of the largest value by which the numbers of an engine that makes this
+    mistake may miss the prediction.
+    """
+
+    @property
+    def fitted(self) -> bool:
+        """Return whether a number of the mistake was fitted to the table."""
+        return self.times > 1.0
+
+    def within(self, names: Collection[str], words: str = "") -> "Mistake":
+        """Return the mistake made in these quantities alone; words end its text."""
+
+        def predict(quantity: str) -> Array | None:
+            return self.predict(quantity) if quantity in names else None
+
+        return self._replace(text=f"{self.text}{words}", predict=predict)
+
+    def mirrored(self, y: float) -> "Mistake":
+        """Return the mistake with angles, rates and torques of the opposite sign.
+
+        The y components of its vectors are multiplied by a factor.
+        """
+
+        def predict(quantity: str) -> Array | None:
+            values = self.predict(quantity)
+            if values is None:
+                return None
+            if values.ndim == 2:
+                return np.asarray(values * (1.0, y))
+            return -values if find_unit_of_quantity(quantity) in _TURNING else values
+
+        return self._replace(predict=predict)
+
+
+def solve_other(text: str, scene: Scene, at: Command) -> Mistake:
+    """Return the mistake of another problem than the one that was set.
+
+    It is solved when its numbers are asked for; without such a scene it has none.
+    """
+
+    @cache
+    def solved() -> Solution | None:
+        try:
+            return solve(scene, at=at)
+        except FourBarError:
+            return None
+
+    def predict(quantity: str) -> Array | None:
+        solution = solved()
+        if solution is None or quantity in (at.commanded, *_OF_FORMULAS):
+            return None
+        return compute_column(solution, quantity)
+
+    return Mistake(text, predict)
+
+
+def drop_remainder(command: Command) -> Command:
+    """Return a command without what its doubles leave out."""
+    if isinstance(command.origin, StrokeOrigin):
+        return command._replace(origin=command.origin._replace(lost=None))
+    return command.as_doubles()
+
+
+def state_all(scene: Scene) -> Scene:
+    """State every number that a mistake may change: bars in full, places, gravity."""
+    bars = {
+        name: replace(
+            bar,
+            density=None,
+            mass_per_length=None,
+            inertia=bar.moment_of_inertia,
+            centre=bar.mass_centre,
+        )
+        for name, bar in list_moving(scene)
+    }
+    named = {point.name: point.place for point in scene.points}
+    scene = scene.with_places(lambda place: named.get(place.point or "", place))
+    if not any(isinstance(effect, Gravity) for effect in scene.effects):
+        scene = replace(scene, effects=(*scene.effects, Gravity(0.0)))
+    return replace_bars(scene, **bars)
 
 
 def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
