@@ -356,8 +356,8 @@ def test_failures_are_one_line_an_engine_and_cause(printed):
 def draw_answer(*rows, **numbers):
     """Draw the scene with these rows of an engine and what it answered."""
     answer = Answer("mine", "exact", SOLUTION.at, SOLUTION.assembled, numbers)
-    record = Record("s", SCENE, rows=[*rows], solution=SOLUTION, answers=[answer])
-    return draw_scene_figure(record) or ""
+    record = Record("s", rows=[*rows])
+    return draw_scene_figure(record, SCENE, SOLUTION, [answer]) or ""
 
 
 @mark.slow

@@ -25,13 +25,8 @@ def list_marks(scene, solution, torque, *at):
         *at,
         quantities={"torque": torque},
     )
-    record = Record(
-        "scene",
-        scene,
-        solution=solution,
-        answers=[answer, answer],
-    )
-    _, drawn, *_ = draw_scene_figure(record).split("</svg>")
+    figure = draw_scene_figure(Record("scene"), scene, solution, [answer, answer])
+    _, drawn, *_ = figure.split("</svg>")
     assert ">T₂ (N m)</text>" in drawn
     groups = re.findall(r"<g clip-path[^>]*>((?:<use [^>]*>)+)</g>", drawn)
     of_answers = "".join(groups[:2])  # before their errors
@@ -76,5 +71,6 @@ def test_where_a_curve_is_cut_a_label_says_so():
     pole = WHOLE.torque.copy()
     pole[100:102] *= 1e3
     for torque, cuts in ((1e3 * WHOLE.torque, 0), (pole, 1)):
-        record = Record("pole", PLAIN, solution=replace(WHOLE, torque=torque))
-        assert draw_scene_figure(record).count("towards a pole") == cuts
+        solution = replace(WHOLE, torque=torque)
+        figure = draw_scene_figure(Record("pole"), PLAIN, solution, [])
+        assert figure.count("towards a pole") == cuts

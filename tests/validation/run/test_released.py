@@ -240,5 +240,6 @@ def test_a_released_scene_is_reported_without_a_torque_that_is_rounding(monkeypa
         "draw",
         lambda curve: shown.append(curve.quantity) or "",
     )
-    scene_pictures.draw_scene_figure(Record("falling", scene, solution=solve(scene)))
+    record = Record("falling")
+    scene_pictures.draw_scene_figure(record, scene, solve(scene), [])
     assert shown == ["theta_4", "F32"]

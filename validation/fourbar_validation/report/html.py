@@ -86,25 +86,6 @@ class Section:
     """The columns that hold numbers: from, up to."""
 
 
-@record
-class _SceneView:
-    """Data of one scene that the page shows."""
-
-    scene: Record
-    cells: list[_Cell]
-    engines: list[str]
-    quantities: list[str]
-    by_place: dict[tuple[str, str], _Cell]
-    """(quantity, engine): the comparison that used most of its allowance."""
-    worst: dict[str, _Cell]
-    """engine: its comparison that used most."""
-
-    @property
-    def counts(self) -> Counts:
-        """Return its comparisons by verdict."""
-        return Counts(cell.row for cell in self.cells)
-
-
 def write_html(
     summary: Summary,
     first_lines: dict[str, int],
@@ -123,8 +104,9 @@ def write_html(
         _make_scene_view(scene, first_lines.get(scene.name, 2))
         for scene in summary.shown
     ]
-    cells = [cell for view in views for cell in view.cells]
+    cells = [cell for view in views for cell in view["cells"]]
     rows = [cell.row for cell in cells]
+    figure = (summary.first and summary.first.figure) or ""
     failing = [cell for cell in cells if cell.row.failed]
     failing.sort(key=lambda cell: (-cell.row.used, cell.line))
     return render(
@@ -138,9 +120,10 @@ def write_html(
         groups=OVERVIEW_GROUPS,
         causes=summary.causes,
         places={
-            view.scene.name: (number, view) for number, view in enumerate(views, 1)
+            view["scene"].name: (number, view) for number, view in enumerate(views, 1)
         },
-        answers=Markup(_take_answers(summary.first)),
+        # the pictures of torque and pin force, without the linkage
+        answers=Markup(figure.partition("</svg>")[2] or figure),
         lazy=len(views) > ALL_OPEN,
         sections=sections,
         independence=[
@@ -156,13 +139,6 @@ def write_html(
     )
 
 
-def _take_answers(scene: Record | None) -> str:
-    """Take the pictures of torque and pin force out of a scene's figure."""
-    if scene is None or not scene.figure:
-        return ""
-    return scene.figure.partition("</svg>")[2] or scene.figure
-
-
 def write_summary_page(summary: Summary) -> str:
     """Write the report as Markdown, short enough for a comment on a pull request."""
     return render(
@@ -175,10 +151,12 @@ def write_summary_page(summary: Summary) -> str:
     )
 
 
-def _make_scene_view(
-    scene: Record,
-    first_line: int,
-) -> _SceneView:
+def _make_scene_view(scene: Record, first_line: int) -> dict[str, Any]:
+    """Return the data of one scene that the page shows.
+
+    Of each quantity of an engine, and of each engine, it shows the comparison that used
+    most of its allowance.
+    """
     rows = sort_rows(scene.rows)
     lines = range(first_line, first_line + len(rows))
     cells = [*map(_Cell, lines, rows)]
@@ -195,7 +173,15 @@ def _make_scene_view(
     }
     names = sorted({cell.row.quantity for cell in cells})
     names.sort(key=[*QUANTITY_ORDER, *names].index)
-    return _SceneView(scene, cells, _list_engines(rows), names, by_place, worst)
+    return {
+        "scene": scene,
+        "cells": cells,
+        "counts": Counts(rows),
+        "engines": _list_engines(rows),
+        "quantities": names,
+        "by_place": by_place,
+        "worst": worst,
+    }
 
 
 def _list_engines(rows: Any) -> list[str]:

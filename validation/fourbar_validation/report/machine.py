@@ -26,10 +26,6 @@ DISTRIBUTIONS = REPORTED_DISTRIBUTIONS | {
     name: name for name in ("drake", "exudyn", "opensim")
 }
 """Distribution of each package, including those that need not be installed."""
-CODE = (".py", ".toml")
-"""Endings of the files that numbers come from. Templates and accepted states change
-none.
-"""
 
 
 def list_versions() -> dict[str, str]:
@@ -122,15 +118,15 @@ def name_code(*further: Path) -> dict[str, str]:
 
 
 def hash_modules(*packages: Path) -> str:
-    """Hash the modules of packages, wherever they lie.
+    """Hash the files of packages that numbers come from, wherever they lie.
 
-    The scenes that come with a wheel are none of them.
+    Templates, accepted states and the scenes that come with a wheel change none.
     """
     digest = hashlib.sha256()
     for package in packages:
         for path in sorted(package.rglob("*")):
             if (
-                path.suffix in CODE
+                path.suffix in (".py", ".toml")
                 and path.is_file()
                 and package / "models" not in path.parents
             ):

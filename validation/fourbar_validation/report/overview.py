@@ -54,15 +54,12 @@ _MOST_LISTED = len(PIN_FORCES) + 1
 """Quantities that are listed where several are wrong."""
 _LONGEST_QUOTE = 60
 """Characters that are printed of what an engine said."""
-OTHER_CAUSES = "other causes"
 _TOLD_BY = {"all": "no answer: ", "watch": "alarm: "}
 """Quantities whose reason is the cause, and how it begins."""
 ERROR_OF_MISSING_DIGITS = 1e-5
 """Largest error, relative to a quantity's scale, of an engine that lacks digits and not
 an equation.
 """
-_FREE_MOTION = ("theta_2", "omega_2", "energy")
-"""Quantities that are compared of a released linkage's motion."""
 
 
 @dataclass(slots=True)
@@ -177,7 +174,7 @@ class Causes:
             shown = telling or (engine == FORMULAS and named) or rows
             key = (engine, tuple(_name_causes(scene, engine, rows)))
             if key not in self._kinds and len(self._kinds) >= _MOST_KINDS:
-                key = (engine, (OTHER_CAUSES,))
+                key = (engine, ("other causes",))
             kind = self._kinds.setdefault(key, Cause(engine, "", 0, shown[0]))
             kind.scenes += 1
             kind.worst = max(kind.worst, *shown, key=USED)
@@ -222,7 +219,8 @@ def _list_ours(scene: Record) -> set[str]:
         explained = {engine for engine, causes in scene.causes.items() if causes}
         witnesses |= {row.engine for row in rows} - (failing & explained)
     answered = Counter(row.quantity for row in rows if row.compared)
-    return {*scene.against, *(_FREE_MOTION if scene.against else ())} | {
+    of_free_motion = ("theta_2", "omega_2", "energy") if scene.against else ()
+    return {*scene.against, *of_free_motion} | {
         name_whole(row)
         for row in rows
         if row.failed and name_whole(row) in UNITS and answered[row.quantity] == 1

@@ -77,7 +77,6 @@ _BY_REASON = {
     NO_POSITION: "at no position that can be judged",
 }
 """Those that the reason tells."""
-_DOES_NOT_APPLY = "where a check does not apply"
 
 
 class Summary:
@@ -167,7 +166,8 @@ class Summary:
         reasons = {reason for _, reason in refused}
         for line in scene.left_out:
             engine, _, reason = line.partition(": ")
-            self.not_compared[_DOES_NOT_APPLY] += reason not in reasons
+            inapplicable = "where a check does not apply"
+            self.not_compared[inapplicable] += reason not in reasons
             refused.add((engine, reason))
         for engine, reason in sorted(refused):
             self._left_out.setdefault(engine, AlikeTexts()).add(reason)
@@ -303,11 +303,10 @@ class Summary:
             line.version = "" if line.engine.endswith(f" {version}") else version
             name = ENGINE_NAMES.get(line.engine, f"{line.engine} {{}}")
             line.name = name.format(line.version).replace(" ,", ",").strip()
-        order = [*ENGINE_NAMES]
 
         def place(line: EngineLine) -> tuple[Any, ...]:
             name = line.engine
-            return name == FORMULAS, [*order, name].index(name), name
+            return name == FORMULAS, [*ENGINE_NAMES, name].index(name), name
 
         return sorted(self._lines.values(), key=place)
 

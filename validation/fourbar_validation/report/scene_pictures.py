@@ -3,6 +3,7 @@
 Drawn are the linkage, every engine's answer over the formulas, and the errors beneath.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -57,43 +58,37 @@ _PLOT_COLOURS = {
     "#8a3b78": "--e4",
 }
 """Colours of `fourbar plot`, and the page's own that take their place."""
-_MOTION_AND_FORCE = ("theta_4", "F32")
-"""Quantities shown of a released linkage, whose torque is mere rounding."""
 _SUBSCRIPT = str.maketrans("234", "₂₃₄")
 
 
-def draw_scene_figure(record: Record) -> str | None:
+def draw_scene_figure(
+    record: Record, scene: Scene, solution: Solution, answers: Sequence[Answer]
+) -> str | None:
     """Return the linkage and, for a sweep, the answers as SVGs.
 
     The text is None if nothing assembles. The record is told whose answers are drawn.
     """
-    solution = record.solution
-    scene = record.scene
-    if scene is None or solution is None or not np.any(solution.status_code == OK):
+    if not np.any(solution.status_code == OK):
         return None
     drawn = _draw_best_position(record.name, scene, solution)
     if np.count_nonzero(solution.status_code == OK) < 2:
         return drawn
     shown = ANGLES
     if scene.motion.free is not None:
-        shown = _MOTION_AND_FORCE
+        shown = ("theta_4", "F32")  # the torque is mere rounding
     elif solution.F32 is not None:
         shown = (name_driving(scene), _choose_force(record, solution))
-    curves = [_Curve(name, record, scene, solution) for name in shown]
+    curves = [_Curve(name, record, scene, solution, answers) for name in shown]
     record.drawn = sorted({one.engine for curve in curves for one in curve.answers})
     return drawn + "".join(curve.draw() for curve in curves)
-
-
-def find_best_position(solution: Solution) -> int:
-    """Return the index of the best conditioned position that assembles."""
-    return int(np.argmax(np.where(solution.status_code == OK, solution.condition, -1)))
 
 
 def _draw_best_position(name: str, scene: Scene, solution: Solution) -> str:
     """Draw the linkage as `fourbar plot` does, at its best conditioned position."""
     from matplotlib.figure import Figure
 
-    best = find_best_position(solution)
+    conditions = np.where(solution.status_code == OK, solution.condition, -1.0)
+    best = int(np.argmax(conditions))
     with apply_style():
         figure = Figure(figsize=(3.1, 2.9), layout="constrained")
         here = solve(scene, "position", at=solution.at.part(slice(best, best + 1)))
@@ -138,12 +133,13 @@ class _Curve:
     record: Record
     scene: Scene
     solution: Solution
+    answers: Sequence[Answer]
 
     def __post_init__(self) -> None:
         self.good = self.solution.status_code == OK
         self.answers = [
             answer
-            for answer in self.record.answers
+            for answer in self.answers
             if answer.refusal is None and self.quantity in answer.quantities
         ]
 

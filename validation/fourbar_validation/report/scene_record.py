@@ -8,9 +8,6 @@ from dataclasses import asdict, dataclass, field, replace
 from operator import attrgetter
 from typing import Any
 
-from fourbar.scene import Scene
-from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.rows import COLUMN_TYPES, FORMULAS, Row, sort_rows
 
 
@@ -27,14 +24,9 @@ class Timing:
 
 @dataclass(slots=True)
 class Record:
-    """Record of one scene.
-
-    While it is judged it has all that its picture needs, afterwards the small and
-    storable part.
-    """
+    """Record of one scene, which a run stores."""
 
     name: str
-    scene: Scene | None = None
     title: str = ""
     source: str = ""
     needs: list[str] = field(default_factory=list)
@@ -59,34 +51,15 @@ class Record:
     """SVG of the answers, or None where there is nothing to draw."""
     drawn: list[str] = field(default_factory=list)
     """Engines whose answers it shows."""
-    solution: Solution | None = None
-    answers: list[Answer] = field(default_factory=list)
-
-    def kept(self, figure: str | None = None) -> "Record":
-        """Return a copy without the scene, the solution and the answers."""
-        answers = self.answers
-        return replace(
-            self,
-            independence={
-                one.engine: [one.shared, one.own] for one in answers if one.own
-            },
-            evidence={one.engine: one.evidence for one in answers if one.evidence},
-            figure=figure,
-            scene=None,
-            solution=None,
-            answers=[],
-        )
 
     def kept_all(self) -> dict[str, Any]:
-        """Return everything that is kept, in lists and dictionaries.
+        """Return everything in lists and dictionaries.
 
         The rows are sorted.
         """
-        kept = asdict(replace(self, rows=[]))
-        for name in ("scene", "solution", "answers"):
-            del kept[name]
         cells = attrgetter(*COLUMN_TYPES)
-        return kept | {"rows": [[*cells(row)] for row in sort_rows(self.rows)]}
+        rows = [[*cells(row)] for row in sort_rows(self.rows)]
+        return asdict(replace(self, rows=[])) | {"rows": rows}
 
     @classmethod
     def restore(cls, kept: dict[str, Any]) -> "Record":

@@ -7,9 +7,6 @@ from fourbar_validation.compare.rows import VERDICTS, Counts, Row
 from fourbar_validation.report.html import Section
 from fourbar_validation.scenes.hard_families import HARD_FAMILIES
 
-_BESIDE = ("hard/report.html", "cost/*/cost.md")
-"""Pages in OUT of a run of the hard suite, and of studies of cost."""
-
 
 def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     """Collect the section on hard cases, and links to what lies beside the report.
@@ -19,7 +16,7 @@ def collect_sections(hard: Iterable[Row] | None, out: Path) -> list[Section]:
     sections = []
     if hard is not None:
         sections += [collect_hard_cases(hard), _list_declared_limits()]
-    pages = [page for pattern in _BESIDE for page in sorted(out.glob(pattern))]
+    pages = [*out.glob("hard/report.html"), *sorted(out.glob("cost/*/cost.md"))]
     if pages:
         names = [page.relative_to(out).as_posix() for page in pages]
         links = [(name, name) for name in names]

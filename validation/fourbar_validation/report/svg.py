@@ -23,8 +23,6 @@ INK, SOFT, GRID, BAND, ALLOWED, PAPER = (
     LIGHT_COLOURS[f"--{name}"]
     for name in ("ink", "soft", "grid", "under", "allowed", "paper")
 )
-_BLACK = "#000000"
-"""Colour of matplotlib's own; in a page it is the ink."""
 
 
 class Style(NamedTuple):
@@ -73,10 +71,6 @@ LEAST_DRAWN_ERROR = EPS / 16.0
 """Errors below this, zero among them, are drawn here."""
 LONG_NUMBER = re.compile(r"(\d+\.\d)\d+")
 COORDINATES = re.compile(r' (?:d|x|y|transform|points)="[^"]*"')
-STYLE_ATTRIBUTE = re.compile(r' style="([^"]*)"')
-_BETWEEN_TAGS = re.compile(r">\s+<")
-METADATA_ELEMENT = re.compile(r"<metadata>.*?</metadata>", re.DOTALL)
-_GROUP_NAME = re.compile(r'<g id="[^"]*"')
 
 
 def choose_style(engine: str) -> Style:
@@ -141,10 +135,11 @@ def write_alone(figure: Any, salt: str) -> str:
 
 def _shrink_svg(svg: str) -> str:
     """Make the SVG smaller, and take the colours of the page around it."""
-    svg = METADATA_ELEMENT.sub("", svg)
+    svg = re.sub("<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = COORDINATES.sub(lambda match: LONG_NUMBER.sub(r"\1", match.group()), svg)
-    svg = _GROUP_NAME.sub("<g", _BETWEEN_TAGS.sub("><", svg))
-    for variable, colour in (("--ink", _BLACK), *LIGHT_COLOURS.items()):
+    svg = re.sub('<g id="[^"]*"', "<g", re.sub(r">\s+<", "><", svg))
+    black = "#000000"  # of matplotlib's own; in a page it is the ink
+    for variable, colour in (("--ink", black), *LIGHT_COLOURS.items()):
         svg = svg.replace(colour, f"var({variable})")
     return _name_styles(svg)
 
@@ -162,7 +157,7 @@ def _name_styles(svg: str) -> str:
         classes[style] = "m" + hashlib.sha256(style.encode()).hexdigest()[:8]
         return f' class="{classes[style]}"'
 
-    svg = STYLE_ATTRIBUTE.sub(name, svg)
+    svg = re.sub(' style="([^"]*)"', name, svg)
     rules = "".join(f".{short}{{{style}}}" for style, short in classes.items())
     # the rule that matplotlib writes for every element would otherwise hold for the
     # whole page

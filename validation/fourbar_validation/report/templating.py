@@ -9,10 +9,6 @@ from pathlib import Path
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.report.svg import choose_style
 
-_LEAST_POWER = 1e6
-"""Least whole number that is written by a power of ten."""
-_SCRIPT = Path(__file__).with_name("templates") / "report.js"
-
 
 def render(package: str, name: str, /, **what: object) -> str:
     """Fill in a template of a package.
@@ -43,7 +39,8 @@ def render(package: str, name: str, /, **what: object) -> str:
         "symbol": lambda engine: choose_style(engine).symbol,
     }
     # the only script that the page's security policy lets run
-    script = _SCRIPT.read_text(encoding="utf-8")
+    file = Path(__file__).with_name("templates") / "report.js"
+    script = file.read_text(encoding="utf-8")
     digest = _encode(hashlib.sha256(script.encode()).digest())
     environment.globals |= {"script": script, "script_hash": f"sha256-{digest}"}
     return environment.get_template(name).render(**what)
@@ -74,6 +71,6 @@ def count_or_size(value: float) -> str:
 
     A count, which is a whole number below a million, is written in full.
     """
-    if abs(value) < _LEAST_POWER and value == round(value):
+    if abs(value) < 1e6 and value == round(value):
         return str(round(value))
     return f"{value:.3g}".replace("nan", "-")

@@ -111,7 +111,8 @@ def judge_for_report(
 
     `draw`: with its pictures.
     """
-    record = judge(name, scene, engines)
+    question = make_question(name, scene, engines)
+    record = _judge(question)
     for i, row in enumerate(record.rows):
         if row.engine in record.output and row.failed:
             record.rows[i] = replace(
@@ -119,13 +120,19 @@ def judge_for_report(
                 reason=f"{row.reason}; what it printed: {OUTPUT}",
             )
     STYLE_NUMBERS.update(number_guests(engines))
-    return record.kept(draw_scene_figure(record) if draw else None)
+    if draw:
+        answers = [answer for answer, _ in question.list_answers()]
+        record.figure = draw_scene_figure(record, scene, question.solution, answers)
+    return record
 
 
 def judge(name: str, scene: Scene, engines: Sequence[Engine] = ENGINES) -> Record:
     """Make every check of one scene."""
-    question = make_question(name, scene, engines)
-    free = scene.motion.free is not None
+    return _judge(make_question(name, scene, engines))
+
+
+def _judge(question: Question) -> Record:
+    free = question.scene.motion.free is not None
     begin = time.perf_counter()
     question.solution  # noqa: B018 - timed
     seconds = time.perf_counter() - begin

@@ -162,13 +162,14 @@ class Question:
         further = (place, condition, where)
         return Row.judged(who, quantity, error, allowed, reason, *further)
 
+    def list_answers(self) -> list[tuple[Answer, float]]:
+        """Return the answers in the order of the engines, each with its seconds."""
+        names = [engine.name for engine in self.engines]
+        return [self.answered[name] for name in names if name in self.answered]
+
     def record(self, rows: list[Row], seconds: float) -> Record:
         """Make the record of the scene; `seconds`: that the formulas took."""
-        answered = [
-            self.answered[engine.name]
-            for engine in self.engines
-            if engine.name in self.answered
-        ]
+        answered = self.list_answers()
         n = len(self.at.angle)
         ours = Timing(self.name, FORMULAS, "exact", len(self.solution), seconds)
         timings = [ours, *self.timings]
@@ -178,18 +179,17 @@ class Question:
         ]
         return Record(
             self.name,
-            self.scene,
             escape_controls(self.scene.title),
             escape_controls(self.scene.source),
             list_needs(self.scene),
             rows,
             timings,
             self.left_out,
-            output=self.output,
-            causes=self.causes,
-            against=self.against,
-            solution=self.solution,
-            answers=[answer for answer, _ in answered],
+            {one.engine: [one.shared, one.own] for one, _ in answered if one.own},
+            {one.engine: one.evidence for one, _ in answered if one.evidence},
+            self.output,
+            self.causes,
+            self.against,
         )
 
     def attempt(
