@@ -38,7 +38,7 @@ from fourbar.show.plot.style import (
     apply_style,
     plot_points,
 )
-from fourbar.show.plot.symbols import pose_of
+from fourbar.show.plot.symbols import Pose
 from fourbar.show.plot.view import make_view
 from fourbar.writing import write_text
 from fourbar_lab.benchmark import DIFFERENTIATED as LOOP
@@ -327,7 +327,7 @@ def draw_problem(name: str) -> str:
             view = make_view(
                 fourbar.load(PROBLEMS / f"{name}.toml"), SHOWN_AT.get(name)
             )
-            pins = pose_of(view, view.here, 0).pins
+            pins = Pose(view, view.here, 0).pins
             plot_points(axes, [pins["O2"], pins["O4"]], **GROUND_LINE)
             for pin in ("O2", "O4"):
                 draw_support(axes, pins[pin], view.plane.size)

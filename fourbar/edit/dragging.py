@@ -27,8 +27,6 @@ from fourbar.studies.keys import list_described
 
 _SAME_ANGLE = 1e-9
 """rad. Difference below which the position shown is the one that is drawn."""
-_LEAST_DIGITS = 1e-12
-"""Finest grain, relative to the number itself."""
 
 
 class _Handle(NamedTuple):
@@ -144,7 +142,7 @@ def drag(
     Raises InputError where nothing of that name can be dragged, or the linkage does not
     assemble there.
     """
-    theta_2 = np.array([dragged.theta_2])
+    theta_2 = np.array([dragged.theta_2], dtype=float)
     branch = np.array([dragged.branch], dtype=np.int8)
     state = compute_shown_state(scene, Command(theta_2, branch, 0.0, 0.0))
     if isinstance(dragged.what, str):
@@ -271,7 +269,8 @@ def put_number(
 
 def write_rounded(value: float, grain: float, unit: str) -> str:
     """Write a number with its unit, to the power of ten next below the grain."""
-    finest = max(grain, _LEAST_DIGITS * abs(value), 1e-300)
+    # finest grain, relative to the number itself
+    finest = max(grain, 1e-12 * abs(value), 1e-300)
     digits = -math.floor(math.log10(finest))
     shown = f"{round(value, digits):.{max(digits, 0)}f}"
     return f"{shown.rstrip('0').rstrip('.') if '.' in shown else shown} {unit}"

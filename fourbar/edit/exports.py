@@ -10,7 +10,6 @@ JSON lists them: writing these as text takes longer than solving.
 """
 
 import asyncio
-import base64
 import importlib.util
 import json
 import math
@@ -42,15 +41,13 @@ from fourbar.solving import find_last_stage, solve
 from fourbar.studies.passing import say_nowhere
 from fourbar.writing import write_text
 
-_ENDINGS = {
+EXPORT_ENDINGS = {
     **{kind: kind for kind in ("svg", "png", "pdf", "csv", "gif")},
     "mjcf": "xml",
     "page": "html",
 }
 """Ending of the file by the name of the format."""
 HARNESS_PACKAGE = "fourbar_validation"
-LAST_LINES = 30
-"""Lines of what the harness prints."""
 
 
 def evaluate_scene(
@@ -149,8 +146,7 @@ def list_peaks(solution: Solution, facts: Facts | None) -> dict[str, float | Non
     """
     sizes = {} if solution.F12 is None else compute_pin_loads(solution)
     drive = read_drive_demand(solution)
-    is_driven = solution.scene is None or solution.scene.motion.free is None
-    if is_driven and drive.values is not None:
+    if solution.scene.motion.free is None and drive.values is not None:
         sizes[drive.keys.value] = drive.sizes
     peaks = dict[str, float | None]()
     for name, values in sizes.items():
@@ -189,40 +185,21 @@ def pack_frame(about: dict[str, Any]) -> bytes:
     return b"".join((length, text, *arrays))
 
 
-class Exports:
-    """The folder that exports go to; made when there is something for it."""
+def write_export(scene: Scene, path: Path, kind: str, units: Conversion) -> None:
+    """Write one export, whose kind is one of `EXPORT_ENDINGS`; its folder is made."""
+    from fourbar.mjcf import write_mjcf_for
+    from fourbar.show.animate import write_animation
+    from fourbar.show.plot import draw
 
-    def __init__(self, folder: Path, stem: str) -> None:
-        self.folder = folder
-        self.stem = stem
-
-    def write(self, scene: Scene, name: str, units: Conversion) -> Path:
-        """Write one export and return its path."""
-        from fourbar.mjcf import write_mjcf_for
-        from fourbar.show.animate import write_animation
-        from fourbar.show.plot import draw
-
-        path = self.folder / f"{self.stem}.{_ENDINGS[name]}"
-        self.folder.mkdir(exist_ok=True)
-        if name == "csv":
-            write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
-        elif name == "mjcf":  # which has units of its own
-            write_text(path, write_mjcf_for(scene))
-        elif name in ("page", "gif"):
-            write_animation(scene, path, units=units)
-        else:
-            draw(scene, path, units=units)
-        return path
-
-    @staticmethod
-    def free_bodies(scene: Scene, position: float, units: Conversion) -> str:
-        """Draw the free bodies at a position, as the address of a picture."""
-        from fourbar.show.plot.figures import draw_figure
-        from fourbar.show.plot.style import add_dark_form
-
-        figure = draw_figure(scene, "freebody", position=position, units=units)
-        drawn = add_dark_form(figure._repr_svg_().encode())
-        return f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode('ascii')}"
+    path.parent.mkdir(exist_ok=True)
+    if kind == "csv":
+        write_text(path, write_csv(solve(scene, find_last_stage(scene)), units))
+    elif kind == "mjcf":  # which has units of its own
+        write_text(path, write_mjcf_for(scene))
+    elif kind in ("page", "gif"):
+        write_animation(scene, path, units=units)
+    else:
+        draw(scene, path, units=units)
 
 
 def find_harness() -> list[str]:
@@ -284,7 +261,8 @@ class HarnessRun:
             printed, _ = await self.process.communicate()
             status = self.process.returncode
             assert status is not None
-            lines = printed.decode(errors="replace").splitlines()[:LAST_LINES]
+            # lines of what the harness prints
+            lines = printed.decode(errors="replace").splitlines()[:30]
             about |= {"lines": lines, "stopped": status < 0, "status": status}
         except (DependencyError, OSError) as error:
             about["lines"] = [str(error)]

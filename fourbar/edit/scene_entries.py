@@ -51,8 +51,6 @@ EXAMPLES = {
     "kg/m": "1 kg/m",
 }
 """Examples of the numbers of a bar by their SI unit."""
-_SECTION = ("20 mm", "5 mm")
-"""Example of a pair of lengths: height and thickness of a cross-section."""
 _MOVING = {
     "rad": "60 deg",
     "rad/s": "10 rad/s",
@@ -127,7 +125,12 @@ def _offer_bars(offers: dict[str, Any]) -> None:
         for name, declared in Bar.numbers.items():
             example = EXAMPLES[declared.unit]
             if declared.pair:
-                pair = [example, "0 deg"] if declared.pair == "rad" else [*_SECTION]
+                # example of a pair of lengths: height and thickness of a cross-section
+                pair = (
+                    [example, "0 deg"]
+                    if declared.pair == "rad"
+                    else [*("20 mm", "5 mm")]
+                )
                 part = {"at": ["bars", bar, name], "value": pair}
                 offers["parts"].append(part)
             elif declared.left_out is not REQUIRED_NUMBER:

@@ -42,10 +42,6 @@ looks for the server once a minute.
 """
 ERROR_BAR_DELAY = 0.15
 """s without a change, after which error bars follow."""
-SPREAD_DELAY = 1.0
-"""Time without a change after which the spreads of tolerances are sampled, s. Sampling
-takes seconds.
-"""
 
 
 class Workbench:
@@ -64,7 +60,7 @@ class Workbench:
         self.working: asyncio.Task[None] | None = None
         self.following: asyncio.Task[None] | None = None
         self.leaving: asyncio.TimerHandle | None = None
-        self.check = HarnessRun(session.exports.folder / "check", self.tell)
+        self.check = HarnessRun(session.exports / "check", self.tell)
 
     def join(self, line: "_PageLine") -> None:
         """Add a page, and cancel the end of a server without pages."""
@@ -145,7 +141,9 @@ class Workbench:
             self.tell({"note": str(error)})
             return
         self.tell(about)
-        await asyncio.sleep(SPREAD_DELAY)
+        # time without a change after which the spreads of tolerances are sampled, s.
+        # Sampling takes seconds.
+        await asyncio.sleep(1.0)
         await self._sample(state, data)
 
     async def _sample(self, state: SceneState, data: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from itertools import chain, count, product
+from itertools import count, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,8 +22,13 @@ from fourbar.edit.dragging import (
     put_place,
     write_rounded,
 )
-from fourbar.edit.exports import Exports, evaluate_scene, list_peaks
-from fourbar.edit.scene_entries import SceneDocument, list_offers
+from fourbar.edit.exports import (
+    EXPORT_ENDINGS,
+    evaluate_scene,
+    list_peaks,
+    write_export,
+)
+from fourbar.edit.scene_entries import KeyPath, SceneDocument, list_offers
 from fourbar.errors import FourBarError, InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.files.fields import Entry, SceneFile, split_key
@@ -48,7 +53,6 @@ from fourbar.studies.keys import list_entries, read_number
 from fourbar.writing import read_bytes, write_bytes
 
 EDIT_SCHEMA = "fourbar-edit/2"
-STATE_ENDING = ".edit"
 MOST_STATES = 500
 """Number of states that undo and redo reach."""
 MOST_KEPT = 20
@@ -57,8 +61,6 @@ MOST_SOLVED_ANEW = 100_000
 """Largest number of positions that are solved anew on a change, in a second. A mistyped
 step count must not fill the memory.
 """
-LARGEST_STATE = 100_000_000
-"""Bytes of a state file."""
 NEW = ("300 mm", "100 mm", "250 mm", "220 mm")
 """Ground, input, coupler and output of a new scene."""
 _AS_THE_FILE = "as the file"
@@ -120,13 +122,16 @@ class Session:
 
     def __init__(self, path: Path, exports: Path) -> None:
         self.path = Path(os.path.realpath(path))
-        self.exports = Exports(exports, path.stem)
-        self.state_file = self.path.with_name(self.path.name + STATE_ENDING)
+        self.exports = exports
+        self.stem = path.stem
+        self.state_file = self.path.with_name(self.path.name + ".edit")
         self.token = secrets.token_urlsafe(32)  # of this process alone
         self.unit_names = _AS_THE_FILE
         self.pressure_text = ""
         self.disk = self._read_disk()
         text = write_new_scene(NEW)
+        self.placeholder = tomllib.loads(text) | {"picture": None}
+        """What a new scene states that stands for nothing yet."""
         if self.disk is not None:
             text = read_scene_text(self.path)
         self.texts = [text]
@@ -143,15 +148,16 @@ class Session:
 
     def _resume(self) -> None:
         """Go on where an earlier session stopped."""
-        data = read_bytes(self.state_file, "state file", LARGEST_STATE)
+        # bytes of a state file
+        data = read_bytes(self.state_file, "state file", 100_000_000)
         try:
             state = {"pressure": ""} | json.loads(data)
             if state["schema"] != EDIT_SCHEMA:
                 raise ValueError(f"schema {str(state['schema'])[:60]!r}")
             for key, name in _STORED.items():
                 setattr(self, name, state[key])
-            _require_readable_units(self.unit_names)
-            self.pressure_text = _read_typed_pressure(self.pressure_text)
+            _find_chosen_units(self.unit_names)
+            _read_pressure(self.pressure_text)
             if self.history_index < 0 or self.reference not in self.kept:
                 raise ValueError("it names a state that it does not hold")
             self.now = self.read(self.texts[self.history_index])
@@ -182,16 +188,13 @@ class Session:
     @property
     def units(self) -> Conversion:
         """Units of results: as chosen, or those of the file."""
-        if self.unit_names != _AS_THE_FILE:
-            return _cached_units(self.unit_names)
-        return self.now.units
+        chosen = _find_chosen_units(self.unit_names)
+        return self.now.units if chosen is None else chosen
 
     @property
     def pressure(self) -> float | None:
         """Pressure of the cylinder, Pa; None where none is stated."""
-        if self.pressure_text:
-            return to_si(self.pressure_text, "Pa")
-        return None
+        return _read_pressure(self.pressure_text)
 
     @property
     def fresh(self) -> bool:
@@ -200,7 +203,7 @@ class Session:
         A page then shows an empty drawing.
         """
         stated = self.now.plain | {"picture": None}
-        return self.disk is None and stated == _read_placeholder()
+        return self.disk is None and stated == self.placeholder
 
     @property
     def saved(self) -> bool:
@@ -275,9 +278,11 @@ class Session:
         """
         before = (self.texts, self.history_index, self.now)
         try:
-            action = _ACTIONS[asked["do"]]
+            parameters = dict(asked)
+            parameters.pop("id", None)
+            action = getattr(self, f"_do_{parameters.pop('do')}")
             with state_messages_in(self.now.units):
-                note = action(self, asked) or {}
+                note = action(**parameters) or {}
             return self.answer() | note
         # the server goes on after any error, also after a request without sense
         except Exception as error:
@@ -315,24 +320,20 @@ class Session:
             # entries that were put in then stand as in a file; too slow for each step
             self.document = SceneDocument(now.text)
 
-    # ---- one method for each request that a page can make ----
+    # ---- one method for each request that a page can make, by its parameters ----
 
-    def _do_hello(self, asked: Asked) -> Asked:
+    def _do_hello(self) -> Asked:
         """List what a page needs once: what it offers."""
         offers = list_offers() | {"units": OFFERED_UNITS}
         return {"offers": offers, "file": self.path.name, "refer": True}
 
-    def _do_set(self, asked: Asked) -> None:
-        path = asked["path"]
-        text = str(asked["value"])
-        gesture = str(asked.get("gesture", ""))
-        self.change(lambda document: document.set(path, text), gesture)
+    def _do_set(self, path: KeyPath, value: str, gesture: str = "") -> None:
+        self.change(lambda document: document.set(path, value), gesture)
 
-    def _do_add(self, asked: Asked) -> None:
-        part = list_offers()["parts"][int(asked["part"])]
-        name = str(asked.get("name", ""))
-        path = [name if step == "" else step for step in part["at"]]
-        value = part["value"]
+    def _do_add(self, part: int, name: str = "") -> None:
+        offered = list_offers()["parts"][part]
+        path = [step or name for step in offered["at"]]
+        value = offered["value"]
         scene = self.now.scene
         entries = list_entries(scene)
         if path[0] == "tolerances" and name in entries:
@@ -344,33 +345,23 @@ class Session:
             value = f"{abs(number):.1g} {unit}"
         self.change(lambda document: document.put(path, value))
 
-    def _do_remove(self, asked: Asked) -> None:
-        self.change(lambda document: document.remove(asked["path"]))
+    def _do_remove(self, path: KeyPath) -> None:
+        self.change(lambda document: document.remove(path))
 
-    def _do_drag(self, asked: Asked) -> None:
-        names = {"grain", "theta_2", "stretch"} & asked.keys()
-        numbers = {name: float(asked[name]) for name in names}
-        x, y = map(float, asked["to"])
-        branch = int(asked["branch"])
-        dragged = Dragged(asked["what"], complex(x, y), branch=branch, **numbers)
+    def _do_drag(self, to: tuple[float, float], gesture: str = "", **more: Any) -> None:
+        dragged = Dragged(to=complex(*to), **more)
 
         def alter(document: SceneDocument) -> None:
             drag(document, self.base.scene, self.base.plain, dragged)
 
-        self.change(alter, str(asked.get("gesture", "")))
+        self.change(alter, gesture)
 
-    def _do_text(self, asked: Asked) -> None:
+    def _do_text(self, text: str) -> None:
         # refused in the words of the file's reader
-        text = self.read(str(asked["text"])).text
+        self.read(text)
         self.change(lambda document: document.become(text))
 
-    def _do_undo(self, asked: Asked) -> None:
-        self._move_in_history(-1)
-
-    def _do_redo(self, asked: Asked) -> None:
-        self._move_in_history(1)
-
-    def _move_in_history(self, by: int) -> None:
+    def _do_undo(self, by: int = -1) -> None:
         index = self.history_index + by
         if not 0 <= index < len(self.texts):
             raise InputError("history", index, "no further state to undo or redo")
@@ -379,7 +370,10 @@ class Session:
         self.gesture = ""
         self.document = SceneDocument(self.now.text)
 
-    def _do_keep(self, asked: Asked) -> Asked:
+    def _do_redo(self) -> None:
+        self._do_undo(1)
+
+    def _do_keep(self) -> Asked:
         *_, last = self.kept
         number = 0 if last == "start" else int(last.removeprefix("state "))
         name = f"state {number + 1}"
@@ -387,69 +381,67 @@ class Session:
         if len(self.kept) > MOST_KEPT:
             _, oldest, *_ = self.kept
             del self.kept[oldest]
-        return self._do_refer({"to": name})
+        return self._do_refer(name)
 
-    def _do_refer(self, asked: Asked) -> Asked:
-        name = asked["to"]
-        if name not in self.kept:
+    def _do_refer(self, to: str) -> Asked:
+        if to not in self.kept:
             known = ", ".join(self.kept)
-            raise InputError("reference", name, f"must be one of {known}")
-        self.reference = name
+            raise InputError("reference", to, f"must be one of {known}")
+        self.reference = to
         return {"refer": True}
 
-    def _do_units(self, asked: Asked) -> Asked:
-        name = str(asked["units"])
-        _require_readable_units(name)
-        self.unit_names = name
+    def _do_units(self, units: str) -> Asked:
+        _find_chosen_units(units)
+        self.unit_names = units
         return {"refer": True}
 
-    def _do_pressure(self, asked: Asked) -> None:
-        self.pressure_text = _read_typed_pressure(str(asked["pressure"]))
+    def _do_pressure(self, pressure: str) -> None:
+        _read_pressure(pressure)
+        self.pressure_text = pressure.strip()
 
-    def _do_command(self, asked: Asked) -> None:
+    def _do_command(self, command: str, theta_2: float | None = None) -> None:
         """Command another bar, or the cylinder.
 
         The range is what the present motion covers of it.
         """
-        commanded = str(asked["command"])
-        names_of = {
-            names[0]: names for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)
-        }
-        names = names_of[commanded]
+        (names,) = (
+            names
+            for names in (*COMMAND_NAMES.values(), STROKE_COMMAND)
+            if names[0] == command
+        )
         now = self.now
         has_speed = now.scene.motion.speed is not None
         before = solve(now.scene, "force" if has_speed else "position")
-        values = getattr(before, commanded)
+        values = getattr(before, command)
         if values is None:
             reason = "needs a cylinder: add one in place of the bar first"
-            raise InputError("command", commanded, reason)
+            raise InputError("command", command, reason)
         reached = np.unique(values[np.isfinite(values)])
         if len(reached) < 2:
             reason = "does not move in this motion: choose another sweep first"
-            raise InputError("command", commanded, reason)
+            raise InputError("command", command, reason)
         first, last = reached[[0, -1]].tolist()
         from_middle = np.abs(values - 0.5 * (first + last))
         row = int(np.nanargmin(from_middle))
-        if asked.get("theta_2") is not None:
-            away = np.exp(1j * before.theta_2) - np.exp(1j * float(asked["theta_2"]))
+        if theta_2 is not None:
+            away = np.exp(1j * before.theta_2) - np.exp(1j * theta_2)
             row = int(np.argmin(np.where(before.assembled, np.abs(away), np.inf)))
 
         document = SceneDocument(now.text)
-        motion = now.plain["motion"]
-        for name in {*chain(*names_of.values()), "side", "free", "law"} & motion.keys():
+        for name in now.plain["motion"].keys() - {"branch"}:
             document.remove(["motion", name])
-        is_stroke = commanded == "stroke"
+        is_stroke = command == "stroke"
         si, unit, rate_unit = "rad", "deg", find_unit_in("rad/s", now.units)[0]
         if is_stroke:
             si, unit = "m", find_unit(find_length(now.plain), "m")
             rate_unit = f"{unit}/s"
         steps = max(60, min(len(before) - 1, 360))
         zero = f"0 {unit}"
-        document.put(["motion", commanded], {"from": zero, "to": zero, "steps": steps})
+        document.put(["motion", command], {"from": zero, "to": zero, "steps": steps})
         # so that rounding leads to no position beyond
         inset = 1e-3 * (last - first)
         for end, value in (("from", first + inset), ("to", last - inset)):
-            put_number(document, ["motion", commanded, end], value, inset, si)
+            put_number(document, ["motion", command, end], value, inset, si)
         if has_speed:
             # of the middle: where the bar turns back it is none
             rates = getattr(before, names[1])
@@ -479,21 +471,19 @@ class Session:
             distances[text] = float(np.min(np.nan_to_num(away, nan=np.inf)))
         return min(distances, key=distances.__getitem__)
 
-    def _do_restate(self, asked: Asked) -> None:
+    def _do_restate(self, path: KeyPath, by: str) -> None:
         """State a place by x and y, or by distance and angle."""
-        path = asked["path"]
-        by = str(asked["by"])
         places = {handle.path: handle.beyond for handle in list_handles(self.now.scene)}
         place = places[tuple(path)]
         grain = 1e-6 * abs(place)
         self.change(lambda document: put_place(document, path, place, grain, by))
 
-    def _do_picture(self, asked: Asked) -> Asked:
+    def _do_picture(self, data: str) -> Asked:
         """Keep a picture beside the scene, never over a file, under the drawing.
 
         `data`: its data URI.
         """
-        kind, _, text = str(asked["data"]).partition(";base64,")
+        kind, _, text = data.partition(";base64,")
         if kind not in _ENDING_OF_PICTURE:
             raise InputError("picture", kind[:40], "must be a PNG, JPEG or SVG picture")
         content = base64.b64decode(text, validate=True)
@@ -501,12 +491,11 @@ class Session:
         for number in count(1):
             mark = "" if number == 1 else f"-{number}"
             name = f"{self.path.stem}{mark}.{_ENDING_OF_PICTURE[kind]}"
-            picture = TracedPicture(name, folder=str(folder))
             with suppress(FileExistsError), open(folder / name, "xb") as file:
                 file.write(content)
                 break
         try:
-            picture.read()
+            TracedPicture(name, folder=str(folder)).read()
         except InputError:
             (folder / name).unlink()
             raise
@@ -514,20 +503,20 @@ class Session:
         self.change(lambda document: document.put(["picture"], entries))
         return {"note": f"the picture is {name}"}
 
-    def _do_draw(self, asked: Asked) -> Asked:
+    def _do_draw(
+        self, pins: list[tuple[float, float]], unit: str, grain: float
+    ) -> Asked:
         """State four pins in the plane, in a unit, in place of those of the file.
 
         The first drawing becomes the state at the start: it replaces no linkage of the
         user's.
         """
-        unit = str(asked["unit"])
-        grain = float(asked["grain"])
-        pins = {}
-        for pin, (x, y) in zip(PINS, asked["pins"], strict=True):
+        written = {}
+        for pin, (x, y) in zip(PINS, pins, strict=True):
             written_x = write_rounded(float(x), grain, unit)
-            pins[pin] = (written_x, write_rounded(float(y), grain, unit))
+            written[pin] = (written_x, write_rounded(float(y), grain, unit))
         is_first = self.fresh
-        text = write_drawn_scene(pins) if is_first else self.now.text
+        text = write_drawn_scene(written) if is_first else self.now.text
         picture = self.now.plain.get("picture")
 
         def alter(document: SceneDocument) -> None:
@@ -535,7 +524,7 @@ class Session:
             for path in (["lengths"], ["motion", "branch"]):
                 if document.at(path) is not None:
                     document.remove(path)
-            for pin, place in pins.items():
+            for pin, place in written.items():
                 document.put(["pins", pin], [*place])
             if is_first and picture is not None:
                 document.put(["picture"], picture)
@@ -545,10 +534,10 @@ class Session:
             self.kept["start"] = self.now.text
         return {"refer": is_first}
 
-    def _do_save(self, asked: Asked) -> Asked:
+    def _do_save(self, over: bool = False) -> Asked:
         """Write the file; where it is another one than was read, only on demand."""
         name = self.path.name
-        if self._read_disk() != self.disk and not asked.get("over"):
+        if self._read_disk() != self.disk and not over:
             if not self.path.exists():
                 return {"ask": f"{name} was removed meanwhile. Write it again?"}
             return {"ask": f"{name} was changed on the disk meanwhile. Overwrite it?"}
@@ -556,44 +545,37 @@ class Session:
         self.disk = self.now.text
         return {"note": f"saved {name}", "saved": True}
 
-    def _do_export(self, asked: Asked) -> Asked:
-        form = str(asked["format"])
-        return {"note": f"wrote {self.exports.write(self.now.scene, form, self.units)}"}
+    def _do_export(self, format: str) -> Asked:
+        path = self.exports / f"{self.stem}.{EXPORT_ENDINGS[format]}"
+        write_export(self.now.scene, path, format, self.units)
+        return {"note": f"wrote {path}"}
 
-    def _do_bodies(self, asked: Asked) -> Asked:
-        position = float(asked["position"])
-        drawn = self.exports.free_bodies(self.now.scene, position, self.units)
-        return {"bodies": drawn}
+    def _do_bodies(self, position: float) -> Asked:
+        """Draw the free bodies at a position, as the address of a picture."""
+        from fourbar.show.plot import draw_figure
 
-
-_ACTIONS: dict[str, Any] = {
-    name.removeprefix("_do_"): action
-    for name, action in vars(Session).items()
-    if name.startswith("_do_")
-}
-"""Requests that a page can make."""
-
-
-_cached_units = cache(units)
+        scene = self.now.scene
+        drawn = draw_figure(scene, "freebody", position=position, units=self.units)
+        data = base64.b64encode(drawn.render("svg")).decode()
+        return {"bodies": f"data:image/svg+xml;base64,{data}"}
 
 
 @cache
-def _read_placeholder() -> Asked:
-    """Return what the scene states that stands for none, beside a picture."""
-    return tomllib.loads(write_new_scene(NEW)) | {"picture": None}
+def _find_chosen_units(names: str) -> Conversion | None:
+    """Return the chosen units of results; None if they are those of the file."""
+    return None if names == _AS_THE_FILE else units(names)
 
 
-def _require_readable_units(name: str) -> None:
-    if name != _AS_THE_FILE:
-        _cached_units(name)
+def _read_pressure(text: str) -> float | None:
+    """Return a pressure that is typed, Pa; None for an empty text.
 
-
-def _read_typed_pressure(text: str) -> str:
-    """Return a pressure as it was typed; InputError where it is none."""
-    if text.strip():
-        pressure = Entry(SceneFile("workbench"), "pressure", text)
-        pressure.check(Declared("Pa", POSITIVE))
-    return text.strip()
+    Raises InputError where it is none.
+    """
+    if not text.strip():
+        return None
+    entry = Entry(SceneFile("workbench"), "pressure", text)
+    pressure: float = entry.check(Declared("Pa", POSITIVE))
+    return pressure
 
 
 def _list_directions(solution: Solution) -> Any:

@@ -89,8 +89,6 @@ grows with the square of a dotted key's parts.
 """
 _DECIMAL = re.compile(r"(?<![\w.-])[-+]?\d+\.\d")
 """A number with decimals; of a dotted key at most the first dot, however it goes on."""
-LONGEST_SHOWN_LINE = 60
-"""Characters shown of a line that cannot be read."""
 _MOST_LOADS = 1000
 """Limit of the loads, each of which is a term at every position."""
 _TABLES: dict[str, Any] = {
@@ -190,7 +188,8 @@ def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
     line = text.split("\n")[int(place[1]) - 1] if place else text
     why = " ".join(reason.split())[:120]
     allowed = f'{why}; a number with a unit stands in quotes, like "9 in"'
-    return InputError("TOML", line.strip()[:LONGEST_SHOWN_LINE], allowed, shown)
+    # characters shown of a line that cannot be read
+    return InputError("TOML", line.strip()[:60], allowed, shown)
 
 
 def read_scene(document: Entry, folder: str) -> Scene:

@@ -77,7 +77,6 @@ fit is refused in one pass.
 """
 IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet", "yd", "yard", "yards")
 """Units of a length with which a scene is shown in imperial units, yards in feet."""
-_LONGEST_UNIT = 60
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
 
@@ -260,7 +259,7 @@ def ask_library(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     Raises UnitError for what is no unit.
     """
     name = _JOINED.sub(" ", name.rstrip("."))
-    if len(name) > _LONGEST_UNIT or not UNIT_TEXT.fullmatch(name):
+    if len(name) > 60 or not UNIT_TEXT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _load_registry()
     if angle := _PREFIXED_ANGLE.search(name):

@@ -12,10 +12,6 @@ from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
 
-HALVINGS_OF_A_STEP = 60
-"""Halvings of the distance between two samples down to its last digits."""
-INTERVALS = 2000
-"""Least number of intervals of a motion."""
 LADDER = 0.5 ** np.arange(1, 50)
 """Parts of the interval in which the linkage ceases to assemble: quantities may grow
 there as the root of what is commanded.
@@ -140,7 +136,8 @@ class MotionCourse:
             first = float(command(self.scene).angle[0])
             stated = default_places(self.scene, first)
         steps = len(stated) - 1
-        parts = -(-INTERVALS // max(steps, 1))
+        # least number of intervals of a motion
+        parts = -(-2000 // max(steps, 1))
         rows = np.linspace(0.0, steps, parts * steps + 1)
         places = np.interp(rows, np.arange(steps + 1), stated)
         if motion.law is not None:
@@ -174,7 +171,8 @@ def bisect(
 
     The condition holds at the lower end of each interval alone.
     """
-    for _ in range(HALVINGS_OF_A_STEP):
+    # halvings of the distance between two samples down to its last digits
+    for _ in range(60):
         middle = 0.5 * (low + high)
         held = holds(middle)
         low = np.where(held, middle, low)

@@ -72,10 +72,6 @@ _HUNDREDTH, _DEGREE = 0.01, math.radians(1.0)
 """Change of a number for which its influence is reported. It is relative, or in rad for
 an angle.
 """
-_OF_POSITIONS = ("pins", "lengths", "points", "drive")
-"""Beginnings of the keys of numbers on which positions depend."""
-_NO_INFLUENCE = 1e-13
-"""Change over the largest value of its quantity that is rounding."""
 AT_REST = "at_rest"
 """Status where dry friction holds a pin at rest. Its couple, and all that follows from
 it, jumps with the motion. A linkage that stands has its couple 0 and the derivatives of
@@ -204,7 +200,8 @@ class Sensitivity:
         part = f"|{quantity}|" if quantity in PIN_FORCES else quantity
         value, slopes = self.find(part)
         size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-        rounding = _NO_INFLUENCE * np.nanmax(size, initial=0.0)
+        # change over the largest value of its quantity that is rounding
+        rounding = 1e-13 * np.nanmax(size, initial=0.0)
         rows = []
         steps = map(self._find_step, self.keys.values(), self.numbers.tolist())
         for key, step, slope in zip(self.keys, steps, slopes, strict=True):
@@ -299,7 +296,12 @@ def sensitivity(scene: Scene) -> Sensitivity:
     moving = at.speed is not None
     keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)}
     for key, entry in list_entries(scene).items():
-        if moving or key.startswith(_OF_POSITIONS) or ".centre." in key:
+        # beginnings of the keys of numbers on which positions depend
+        if (
+            moving
+            or key.startswith(("pins", "lengths", "points", "drive"))
+            or ".centre." in key
+        ):
             keys[key] = entry
     most = float(at.places.max()) if at.moves_stroke else np.nan
     numbers = [

@@ -13,11 +13,10 @@ Fundamentals of Vibrations, ch. 2.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -54,20 +53,6 @@ _A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
 torsion spring wound by half a turn makes Q jump, which is no zero.
 """
-STANDING_BAR = 1e-3
-"""Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
-takes the place of theta_2.
-"""
-ROUNDING_OF_A_SINE = 50.0 * 2.0**-52
-"""Sine between two bars, times that between bars 3 and 4, below which it is rounding.
-An angle of the input has 16 digits, and bars 3 and 4 lose what this sine is small by.
-"""
-SINE_AT_A_LIMIT = 2.0**-26
-"""Sine between bars 3 and 4 that a rounded angle of the input leaves at a limit."""
-_A_RANGE = 3
-"""Steps of the grid over which Q is nothing: fewer may be a zero that falls on one."""
-_AT_CHANGE_POINT = 1e-4
-"""rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 
 
 class _CircuitRange(NamedTuple):
@@ -162,32 +147,37 @@ def equilibrium(scene: Scene) -> Equilibria:
         first = CircuitCurve(scene)
         others = range(1, len(first.passed))
         curves = [first, *(CircuitCurve(scene, which) for which in others)]
-        of_each = zip(*map(_search, curves), strict=True)
-        found, level, samples, singular, held = (tuple(chain(*of)) for of in of_each)
+        found = list[Equilibrium]()
+        indifferent = list[_CircuitRange]()
+        all_held = list[_CircuitRange]()
+        not_decided = list[RestPosition]()
+        count = 0
+        for curve in curves:
+            # fewer than 3 steps of the grid without Q may be a zero that falls on one
+            indifferent += _list_ranges(curve, curve.level, 3)
+            not_decided += map(curve.place, curve.singular)
+            samples = curve.samples()
+            count += len(samples)
+            places, sizes = _find_zeros(curve, samples)
+            order = curve.order(places)
+            order = order[~_mark_wound(curve, places[order])]
+            held = list[_CircuitRange]()
+            if any(term.dry_pins for term in curve.case.terms):
+                held = _list_ranges(curve, partial(_holds, curve), 0, places[order])
+                all_held += held
+            for row in order:
+                size = float(sizes[row])
+                found.append(_describe_equilibrium(curve, places[row], size, held))
         positions = _solve_at_rest(first)
         moves = _find_moves(first, positions)
-    return Equilibria(found, level, len(samples), singular, held, positions, moves)
-
-
-def _search(curve: CircuitCurve) -> tuple[Iterable[Any], ...]:
-    """Return what `Equilibria` lists of a circuit, and the places of its grid."""
-    level = _list_ranges(curve, curve.level, _A_RANGE)
-    samples = curve.samples()
-    places, sizes = _find_zeros(curve, samples)
-    order = curve.order(places)
-    order = order[~_mark_wound(curve, places[order])]
-    held: list[_CircuitRange] = []
-    if any(term.dry_pins for term in curve.case.terms):
-        held = _list_ranges(curve, partial(_holds, curve), 0, places[order])
-    found = []
-    for place, size in zip(places[order], sizes[order], strict=True):
-        found.append(_describe_equilibrium(curve, place, float(size), held))
-    return (
-        found,
-        [part.ends for part in level if part.is_reached],
-        samples,
-        map(curve.place, curve.singular),
-        [part.ends for part in held if part.is_reached],
+    return Equilibria(
+        tuple(found),
+        tuple(part.ends for part in indifferent if part.is_reached),
+        count,
+        tuple(not_decided),
+        tuple(part.ends for part in all_held if part.is_reached),
+        positions,
+        moves,
     )
 
 
@@ -196,15 +186,14 @@ def _mark_wound(curve: CircuitCurve, tau: Array) -> Mask:
 
     Not marked is what lies beyond a limit or a change point from the first position.
     """
-    wound = np.zeros(len(tau), dtype=bool)
-    if curve.scene.counts_turns:
-        points = curve.points(tau)
-        passed = curve.reached(tau)
-        if curve.extent == math.inf and not curve.full:
-            passed &= np.sin(points[:, 1]) * curve.branch > 0.0
-        theta_2 = curve.theta_1 + curve.count(points[passed, 0])
-        wound[passed] = _is_wound(curve, _turn_to(curve, theta_2))
-    return wound
+    if not curve.scene.counts_turns:
+        return np.zeros(len(tau), dtype=bool)
+    psi, mu = curve.points(tau).T
+    passed = curve.reached(tau)
+    if curve.extent == math.inf and not curve.full:
+        passed &= np.sin(mu) * curve.branch > 0.0
+    theta_2 = curve.theta_1 + curve.count(psi)
+    return passed & _is_wound(curve, _turn_to(curve, theta_2))
 
 
 def _is_wound(curve: CircuitCurve, theta_2: Array) -> Mask:
@@ -238,12 +227,12 @@ def _solve_at_rest(curve: CircuitCurve) -> Solution:
     For a single position, or a released linkage, these are those of the circuit.
     """
     at = curve.at
+    at = Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin)
     if len(at.theta_2) == 1:
         of_circuit = replace(curve.scene, motion=Motion())
         theta_2 = default_places(of_circuit, float(at.theta_2[0]))
         branch = np.full(theta_2.shape, at.branch[0], dtype=np.int8)
         at = Command(theta_2, branch, 0.0, 0.0)
-    at = Command(at.theta_2, at.branch, 0.0, 0.0, origin=at.origin)
     turned = at._replace(angle=_turn_to(curve, at.theta_2))
     return replace(solve(curve.scene, "force", at=turned), theta_2=at.theta_2, at=at)
 
@@ -261,7 +250,8 @@ def _describe_equilibrium(
     places = np.array([tau])
     points = curve.points(places)
     state = curve.state(points)
-    bar = 4 if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]) else 2
+    # where bar 2 stands at a limit, theta_4 takes the place of theta_2
+    bar = 4 if abs(state.k.h2[0]) < 1e-3 * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(points)[0])
     moving = _drop_standing_bar(curve.lengths, state.k)
@@ -274,10 +264,11 @@ def _describe_equilibrium(
     frequency = None
     if stability == "stable" and J > 0.0:
         frequency = math.sqrt(-slope / J) / TURN
-    ends = None
-    for part in reversed(held):
-        if np.remainder(tau - part.low, curve.period) <= part.width:
-            ends = part.ends
+    holding = (
+        part.ends
+        for part in held
+        if np.remainder(tau - part.low, curve.period) <= part.width
+    )
     return Equilibrium(
         curve.place(points[0]),
         stability,
@@ -285,7 +276,7 @@ def _describe_equilibrium(
         slope,
         J,
         frequency,
-        ends,
+        next(holding, None),
         bool(curve.reached(places)[0]),
     )
 
@@ -299,8 +290,11 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     h = np.array([k.h2, k.h3, k.h4])
     ratios = np.array([1.0, lengths.b / lengths.a, lengths.c / lengths.a])
     sines = np.abs(h * ratios[:, np.newaxis])
-    lost_by = np.maximum(sines[0], SINE_AT_A_LIMIT)
-    h[sines * lost_by < ROUNDING_OF_A_SINE] = 0.0
+    # sine between bars 3 and 4 that a rounded angle of the input leaves at a limit
+    lost_by = np.maximum(sines[0], 2.0**-26)
+    # an angle of the input has 16 digits, and bars 3 and 4 lose what the sine between
+    # them is small by
+    h[sines * lost_by < 50.0 * 2.0**-52] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
@@ -393,7 +387,8 @@ def _find_zeros(curve: CircuitCurve, samples: Array) -> tuple[Array, Array]:
     sizes = np.concatenate([sizes, size[continuous]])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         away = np.abs(np.sin(0.5 * (curve.points(zeros) - point)))
-        apart = (away >= _AT_CHANGE_POINT).any(axis=1)
+        # nearer than 1e-4 rad nothing is decided: the curve crosses itself there
+        apart = (away >= 1e-4).any(axis=1)
         zeros = zeros[apart]
         sizes = sizes[apart]
     return zeros, sizes

@@ -42,8 +42,10 @@ from fourbar.scene.numbers import Tolerance
 COMMAND_KEYS = ("motion.theta_2", "motion.theta_3", "motion.theta_4", "motion.stroke")
 """Keys of the commanded angle or stroke."""
 _MASS_CENTRE = "centre"
-OF_A_UNIFORM_BAR = ("inertia", _MASS_CENTRE)
-"""Numbers of a bar that are those of a uniform one if they are left out."""
+OF_A_UNIFORM_BAR = {"inertia": "moment_of_inertia", _MASS_CENTRE: "mass_centre"}
+"""Numbers of a bar that are those of a uniform one if they are left out, and the
+properties that have them then.
+"""
 _KEYS = {"loads": "loads.{0}", "points": "{1.key}", "effects": "effects.{1.key}"}
 """Keys of what a scene holds many of, by its field, from the index and the entry."""
 NumberPath = tuple[str | int, ...]
@@ -56,6 +58,8 @@ class SceneNumber(NamedTuple):
     place: NumberPath
     unit: str
     bound: str = ANY_NUMBER
+    is_left_out: bool = False
+    """True if the scene leaves the number to a uniform bar."""
 
     @property
     def is_drawn_place(self) -> bool:
@@ -116,16 +120,21 @@ def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, Scene
                 entries[of_pin] = SceneNumber(place, by.unit, by.bound)
         return entries
     for name, by in described.numbers.items():
-        is_left = isinstance(described, Bar) and name in OF_A_UNIFORM_BAR
-        if getattr(described, name) is None and not is_left:
+        is_left_out = getattr(described, name) is None
+        if is_left_out and not (
+            isinstance(described, Bar) and name in OF_A_UNIFORM_BAR
+        ):
             continue
         stated = f"{key}.{by.key or name}"
         place = (*path, name)
         if by.pair:
-            for index, declared in enumerate(zip(by.units, by.bounds, strict=True)):
-                entries[f"{stated}.{index}"] = SceneNumber((*place, index), *declared)
+            for index, (unit, bound) in enumerate(
+                zip(by.units, by.bounds, strict=True)
+            ):
+                number = SceneNumber((*place, index), unit, bound, is_left_out)
+                entries[f"{stated}.{index}"] = number
         else:
-            entries[stated] = SceneNumber(place, by.unit, by.bound)
+            entries[stated] = SceneNumber(place, by.unit, by.bound, is_left_out)
     return entries
 
 
@@ -149,7 +158,7 @@ def _list_drawn_places(
         if form == "from_pin":
             stem = stem.removesuffix(f".{form}")
         else:
-            is_centre = form == _MASS_CENTRE and not _is_left_out(scene, entry)
+            is_centre = form == _MASS_CENTRE and not entry.is_left_out
             if not is_centre or read_place(scene, (*holder, form, 0)) == 0.0:
                 continue
         place = (*holder, DRAWN_WORD, axis)
@@ -236,20 +245,12 @@ LEFT_OUT = (
 )
 
 
-def _is_left_out(scene: Scene, entry: SceneNumber) -> bool:
-    """Return True if the scene leaves a number to a uniform bar."""
-    if entry.place[0] != "linkage" or len(entry.place) < 3 or entry.is_drawn_place:
-        return False
-    bar = getattr(scene.linkage, str(entry.place[1]))
-    return getattr(bar, str(entry.place[2])) is None
-
-
 def find_misfit(scene: Scene, entry: SceneNumber, tolerance: Tolerance) -> str | None:
     """Say why a number of a scene cannot have a tolerance; None: it can.
 
     The reader of scene files and the samples of a study both need the answer.
     """
-    if _is_left_out(scene, entry):
+    if entry.is_left_out:
         return LEFT_OUT
     number = read_number(scene, entry)
     if number is None:
@@ -269,10 +270,8 @@ def read_number(scene: Scene, entry: SceneNumber) -> Any:
     if not entry.is_drawn_place:
         return read_place(scene, entry.place)
     *holder, _, axis = entry.place
-    place = _find_stated_place(scene, holder)
-    pin, theta = _find_drawn_frame(scene, place.bar)
-    z = place.vector() * polar(1.0, theta)
-    return pin[int(axis)] + (z.real, z.imag)[int(axis)]
+    _, _, pin, from_pin = _find_drawn(scene, holder)
+    return pin[int(axis)] + from_pin[int(axis)]
 
 
 def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
@@ -285,47 +284,44 @@ def replace_number(scene: Scene, entry: SceneNumber, values: Any) -> Scene:
     x' and y' from the bar's first pin in the axes of the drawing, theta the drawn angle
     of the bar. Both terms stay polar, as a place is stated, and have slopes at z = 0.
     """
-    changed: Scene
-    if not entry.is_drawn_place:
-        changed = replace_place(scene, entry.place, values)
-        return changed
-    *holder, _, axis = entry.place
-    place = _find_stated_place(scene, holder)
-    pin, theta = _find_drawn_frame(scene, place.bar)
-    z = place.vector() * polar(1.0, theta)
-    parts = [z.real, z.imag]
-    parts[int(axis)] = values - pin[int(axis)]
-    moved = place._replace(
-        from_pin=(parts[0], -theta),
-        from_centre=(parts[1], 0.5 * np.pi - theta),
-    )
-    stated = read_place(scene, holder)
-    if isinstance(stated, Bar):
-        stated = copy_with(stated, centre=moved.polar_from_pin())
-    else:
-        stated = stated.with_places(lambda _: moved)
-    changed = replace_place(scene, holder, stated)
+    path: Sequence[str | int] = entry.place
+    new = values
+    if entry.is_drawn_place:
+        *path, _, axis = entry.place
+        place, theta, pin, from_pin = _find_drawn(scene, path)
+        from_pin[int(axis)] = values - pin[int(axis)]
+        x, y = from_pin
+        moved = place._replace(
+            from_pin=(x, -theta), from_centre=(y, 0.5 * np.pi - theta)
+        )
+        new = read_place(scene, path)
+        if isinstance(new, Bar):
+            new = copy_with(new, centre=moved.polar_from_pin())
+        else:
+            new = new.with_places(lambda _: moved)
+    changed: Scene = replace_place(scene, path, new)
     return changed
 
 
-def _find_drawn_frame(scene: Scene, bar: int) -> tuple[tuple[Any, Any], Any]:
-    """Return the first pin of a bar in the drawing, m, and the bar's direction, rad.
+def _find_drawn(
+    scene: Scene, path: Sequence[str | int]
+) -> tuple[Place, Any, list[Any], list[Any]]:
+    """Return a place of a bar, and where it is in the drawing.
 
-    Slopes are left out: a place moves against its bar as the bar was drawn.
+    Returned are the place of a point, a load, an end of a line or a mass centre; the
+    bar's direction, rad; its first pin, m, and the vector from there to the place, m.
+    Slopes of the pins are left out: a place moves against its bar as that was drawn.
     """
-    assert scene.drawing is not None
-    x, y = scene.drawing.place(FIRST_PIN[bar])
-    direction = without_slopes(scene.drawing.vector(bar))
-    return (without_slopes(x), without_slopes(y)), angle(direction)
-
-
-def _find_stated_place(scene: Scene, holder: Sequence[str | int]) -> Place:
-    """Return the place of a point, a load, an end of a line or a bar's mass centre."""
-    stated = read_place(scene, holder)
+    stated = read_place(scene, path)
     if isinstance(stated, Bar):
-        return Place(BAR_NUMBERS[str(holder[-1])], stated.mass_centre)
-    place: Place = stated.place
-    return place
+        place = Place(BAR_NUMBERS[str(path[-1])], stated.mass_centre)
+    else:
+        place = stated.place
+    drawing: Any = scene.drawing
+    theta = angle(without_slopes(drawing.vector(place.bar)))
+    pin = [*map(without_slopes, drawing.place(FIRST_PIN[place.bar]))]
+    z = place.vector() * polar(1.0, theta)
+    return place, theta, pin, [z.real, z.imag]
 
 
 def read_place(value: Any, place: Sequence[str | int]) -> Any:
@@ -333,9 +329,8 @@ def read_place(value: Any, place: Sequence[str | int]) -> Any:
     for name in place:
         if isinstance(name, int):
             value = value[name]
-        elif isinstance(value, Bar) and getattr(value, name) is None:
-            uniform = {"inertia": value.moment_of_inertia, "centre": value.mass_centre}
-            value = uniform[name]
+        elif isinstance(value, Bar):
+            value = getattr(value, OF_A_UNIFORM_BAR.get(name, name))
         else:
             value = getattr(value, name)
     return value
@@ -349,7 +344,7 @@ def read_numbers(scene: Scene) -> dict[str, Any]:
     return {
         key: read_number(scene, entry)
         for key, entry in list_entries(scene).items()
-        if not _is_left_out(scene, entry)
+        if not entry.is_left_out
     }
 
 

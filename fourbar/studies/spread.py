@@ -33,9 +33,6 @@ from fourbar.writing import (
 )
 
 SAMPLES = 8192
-_MOST_SAMPLES = 10_000_000
-_SEEDS = range(2**128)
-"""Whole numbers that seed a generator: it has 128 bits."""
 BAND_PERCENTILES = (1.0, 99.0)
 """Percentiles of the band."""
 EVALUATED_AT_ONCE = 200_000
@@ -44,10 +41,6 @@ PARTED = 0.1
 """First order and samples part where their standard deviations differ by more than this
 share of the larger: the quantity is no longer straight over the tolerances, and a share
 of a variance is that of a straight one.
-"""
-_NEGLIGIBLE = 1e-9
-"""Share of the quantity's largest value below which a deviation is rounding. It decides
-nothing then.
 """
 
 
@@ -82,7 +75,9 @@ class Spread(NamedTuple):
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
         apart = np.abs(self.deviation - self.first_order)
         differ = np.isfinite(self.deviation) & ~(apart <= PARTED * larger)
-        return np.asarray(differ & (larger > _NEGLIGIBLE * size))
+        # share of the quantity's largest value below which a deviation is rounding. It
+        # decides nothing then.
+        return np.asarray(differ & (larger > 1e-9 * size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,11 +161,12 @@ def tolerances(
     JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
-    samples = Whole(2, _MOST_SAMPLES).check("samples", samples)
+    samples = Whole(2, 10_000_000).check("samples", samples)
     is_generator = isinstance(seed, np.random.Generator)
     if not is_generator:
         allowed = "must be a whole number, 0 or more, or a numpy.random.Generator"
-        require_whole("seed", seed, _SEEDS, allowed)
+        # whole numbers that seed a generator: it has 128 bits
+        require_whole("seed", seed, range(2**128), allowed)
     if not scene.tolerances:
         allowed = 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"'
         raise InputError("tolerances", None, allowed)

@@ -22,13 +22,13 @@ from fourbar.show.plot.labels import add_label
 from fourbar.show.plot.style import (
     BAR_COLOURS,
     BAR_DASHES,
+    BAR_LINES,
     FAINT,
     FORCE_COLOURS,
+    FORCE_LINES,
     INK,
     MUTED,
     RING_MARK,
-    choose_bar_line,
-    choose_force_line,
     choose_scale,
     find_peak_index,
     largest_magnitude,
@@ -45,12 +45,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-ORDINARY_PERCENTILE = 95.0
-"""Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
-OUTLIER = 3.0
-"""... and the multiple of it that a curve must exceed to be clipped."""
-CLIPPED = 1.6
-"""A clipped axis ends at this multiple of the ordinary size."""
 _DEGREES = {"rad": ("°", math.degrees(1.0))}
 Looks = dict[str, tuple[str, dict[str, Any]]]
 """Columns and the looks of their curves, by the label."""
@@ -89,8 +83,7 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
     rows = np.searchsorted(positions, poles)
     places = np.insert(positions, rows, np.nan)  # no line crosses a pole
     for label, (values, look) in chart.curves.items():
-        finite = np.where(np.isfinite(values), factor * values, np.nan)
-        shown = np.insert(finite, rows, np.nan)
+        shown = np.insert(factor * values, rows, np.nan)
         axes.plot(places, shown, **{"label": label} | look)
     for pole in poles:
         axes.axvline(pole, color=MUTED, lw=0.9, ls=(0, (1, 1.5)))
@@ -119,11 +112,9 @@ def draw_chart(axes: "Axes", view: View, list_curves: Callable[[View], Chart]) -
 
 def _note_largest(view: View, chart: Chart, limit: float) -> None:
     """Say where the axis ends, and what lies beyond."""
-    largest_of = {
-        label: largest_magnitude(values) for label, (values, _) in chart.curves.items()
-    }
-    label = max(largest_of, key=largest_of.__getitem__)
-    values, _ = chart.curves[label]
+    label, (values, _) = max(
+        chart.curves.items(), key=lambda curve: largest_magnitude(curve[1][0])
+    )
     name = write_plain(label) if "$" in label else label
     index = find_peak_index(values)
     words = view.axis.words(view.sweep.at.places[index], 5)
@@ -165,9 +156,10 @@ def choose_limit(values: Iterable[Array]) -> float | None:
     """Choose the end of a clipped axis; None if no value stands far out."""
     sizes = np.abs(np.concatenate([*values]))
     sizes = sizes[np.isfinite(sizes)]
-    ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE)) if sizes.size else 0.0
-    if sizes.max(initial=0.0) > OUTLIER * ordinary > 0.0:
-        return CLIPPED * ordinary
+    # the ordinary size of a curve; one three times as large is clipped
+    ordinary = float(np.percentile(sizes, 95.0)) if sizes.size else 0.0
+    if sizes.max(initial=0.0) > 3.0 * ordinary > 0.0:
+        return 1.6 * ordinary
     return None
 
 
@@ -211,7 +203,7 @@ def list_angles(view: View) -> Chart:
     """List the angles of the bars that are not the axis."""
     commanded = view.sweep.commanded if view.time is None else ""
     bars = [bar for bar in MOVING_BARS if f"theta_{bar}" != commanded]
-    looks = {rf"$\theta_{bar}$": (f"theta_{bar}", choose_bar_line(bar)) for bar in bars}
+    looks = {rf"$\theta_{bar}$": (f"theta_{bar}", BAR_LINES[bar]) for bar in bars}
     named = "the bars"
     symbol = r"$\theta$"
     if len(bars) < 3:
@@ -225,9 +217,9 @@ def _list_rates(letter: str, sign: str, title: str, view: View) -> Chart:
     looks = {}
     for bar in MOVING_BARS:
         name = f"{letter}_{bar}"
-        look = choose_bar_line(bar)
+        look = BAR_LINES[bar]
         if bar == view.sweep.at.bar:
-            look |= {"ls": "-", "lw": 1.0}
+            look = look | {"ls": "-", "lw": 1.0}
             if not np.any(view.sweep[name]):
                 continue
         looks[f"${sign}_{bar}$"] = name, look
@@ -308,15 +300,11 @@ def list_transmission(view: View) -> Chart:
     return chart
 
 
-_FORCE_LOOKS: Looks = {
-    write_force_name(name): (name, choose_force_line(name)) for name in FORCE_COLOURS
-}
-
-
 def list_pin_forces(view: View) -> Chart:
     """List the sizes of the pin forces."""
     view.note_rest(view.sweep)
-    return make_chart("Pin forces", "$|F|$", _FORCE_LOOKS, view, zero="end")
+    looks = {write_force_name(name): (name, look) for name, look in FORCE_LINES.items()}
+    return make_chart("Pin forces", "$|F|$", looks, view, zero="end")
 
 
 _SHAKING_LOOKS: Looks = {
@@ -325,12 +313,12 @@ _SHAKING_LOOKS: Looks = {
     "$F_y$": ("shaking_force_y", {"color": BAR_COLOURS[4], "ls": (0, (1, 1))}),
 }
 _STROKE_LOOKS: Looks = {"stroke": ("stroke", {"color": INK})}
-_MOMENT_LOOKS: Looks = {"M": ("shaking_moment", choose_bar_line(2))}
+_MOMENT_LOOKS: Looks = {"M": ("shaking_moment", BAR_LINES[2])}
 _RATIO_LOOKS: Looks = {
-    "ω₃/ω₂": ("omega_3/omega_2", choose_bar_line(3)),
-    "ω₄/ω₂": ("omega_4/omega_2", choose_bar_line(4)),
+    "ω₃/ω₂": ("omega_3/omega_2", BAR_LINES[3]),
+    "ω₄/ω₂": ("omega_4/omega_2", BAR_LINES[4]),
 }
-_ADVANTAGE_LOOKS: Looks = {"T₄/T₂": ("mechanical_advantage", choose_bar_line(2))}
+_ADVANTAGE_LOOKS: Looks = {"T₄/T₂": ("mechanical_advantage", BAR_LINES[2])}
 CHARTS: dict[str, Callable[[View], Chart]] = {
     "angles": list_angles,
     "omega": partial(_list_rates, "omega", "ω", "Angular velocities"),

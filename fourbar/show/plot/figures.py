@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-_LINKAGE_WIDER = [1.15, 1.0]
-"""Widths of two columns, of which the left one has the linkage."""
 _PANELS: dict[str, Callable[["Axes", View], None]] = {
     "linkage": linkage_figure.draw_linkage,
     "moving linkage": partial(linkage_figure.draw_linkage, moving=True),
@@ -54,7 +52,8 @@ class FigureKind(NamedTuple):
 
 def _draw_panels(figure: "SubFigure", shown: View, *, rows: list[Any]) -> None:
     """Draw panels by their names, row by row; a name that is repeated is one panel."""
-    widths = _LINKAGE_WIDER if len(rows[0]) == 2 else None
+    # widths of two columns, of which the left one has the linkage
+    widths = [1.15, 1.0] if len(rows[0]) == 2 else None
     panels = figure.subplot_mosaic(rows, width_ratios=widths)
     for name, draw_panel in _PANELS.items():
         if name in panels:

@@ -25,18 +25,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FRAMES_PER_SECOND = 25
-FILM_DPI = 100
-"""Pixels per inch of a film."""
-_MAX_FRAMES = 1500
-FILM_SIZE = (6.4, 5.6)
-SWEEP_SECONDS = 6.0
-"""Duration of a film of a sweep if no other is stated, s."""
-WINDOW_POSITIONS = 12
-"""Positions whose symbols the window is made to hold."""
 _STAYS = 255
 """Colour, after those of the palette, of a pixel that a frame leaves as it was."""
-SHORTEST_FILM = 1.0
-"""A motion through time shorter than this, s, is slowed down to be seen."""
 
 
 def _find_ffmpeg() -> str:
@@ -70,7 +60,7 @@ def write_film(
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder
     is missing.
     """
-    longest = _MAX_FRAMES / FRAMES_PER_SECOND
+    longest = 1500 / FRAMES_PER_SECOND
     if seconds is not None and not 0.0 < seconds <= longest:
         allowed = f"must be more than 0 and at most {longest:g}"
         raise InputError("seconds", seconds, allowed)
@@ -79,10 +69,11 @@ def write_film(
         shown = make_view(scene)
         shown.units = units
         if seconds is None:
-            seconds = SWEEP_SECONDS
+            seconds = 6.0  # of a film of a sweep
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
-                seconds = min(max(duration, SHORTEST_FILM), longest)
+                # a motion through time shorter than 1 s is slowed down to be seen
+                seconds = min(max(duration, 1.0), longest)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         with tempfile.TemporaryDirectory() as folder:
             _write_gif(Path(folder, "film.gif"), _draw_frames(shown, order, moving))
@@ -185,7 +176,7 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any
 
     sweep = shown.sweep
     axis = shown.axis
-    figure = Figure(figsize=FILM_SIZE, dpi=FILM_DPI, layout="constrained")
+    figure = Figure(figsize=(6.4, 5.6), dpi=100, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(shorten_text(shown.scene.title, 70), **TITLE)
     draw_frame(axes, shown)
@@ -217,7 +208,7 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any
 
     closes = np.flatnonzero(sweep.assembled)
     # the window holds what acts at every position
-    for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
+    for index in closes[:: max(1, len(closes) // 12)]:
         move(int(index))
     label_plane(axes, shown, "θ")
     place_legend(axes, 3)

@@ -38,11 +38,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
-LABEL_SPACE = 1.3
-"""The window is this much wider than what it shows: space for the labels."""
-STATIONS_DRAWN = 401
-"""Stations along a bar."""
-
 
 class Arrow(NamedTuple):
     """A force on a bar: its point and its vector, N.
@@ -140,7 +135,8 @@ def draw_free_bodies(figure: "SubFigure", view: View) -> None:
     for axes, bar in zip(panels, freed, strict=True):
         _draw_one(axes, view, bar, scale)
     # one window size: the bars, too, are to one scale
-    span = LABEL_SPACE * max(axes.dataLim.size.max() for axes in panels)
+    # 1.3 leaves space for the labels
+    span = 1.3 * max(axes.dataLim.size.max() for axes in panels)
     for axes in panels:
         x, y = axes.dataLim.get_points().mean(axis=0) - 0.5 * span
         axes.set(xlim=(x, x + span), ylim=(y, y + span), xticks=[], yticks=[])
@@ -176,7 +172,7 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     facts = Facts(solution)
     for column, (bar, worst) in zip(panels.T, facts.bending.items(), strict=True):
         coarse = internal_forces(view.scene, worst.solution, bar).x
-        x = np.linspace(coarse[0], coarse[-1], STATIONS_DRAWN)
+        x = np.linspace(coarse[0], coarse[-1], 401)
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))

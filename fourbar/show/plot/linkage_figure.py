@@ -3,7 +3,6 @@
 Plots and films draw it alike.
 """
 
-from collections.abc import Iterable, Iterator
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +26,7 @@ from fourbar.show.plot.style import (
     write_labelled_quantity,
     write_pin_name,
 )
-from fourbar.show.plot.symbols import draw_symbol, draw_vectors, list_acting, pose_of
+from fourbar.show.plot.symbols import Pose, draw_symbol, draw_vectors, list_acting
 from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 from fourbar.studies.paths import measure_paths
@@ -36,14 +35,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_NAMED_AT = 0.35
-"""Part of a bar's length at which its name stands: a mass centre is often mid-bar."""
 _ON_BAR = 1e-3
 """Part of a bar's length below which a point seems to lie on the bar's line."""
-BAR_WIDTH = 4.5
-"""Width of a bar, typographic points."""
-Path = tuple[Array, dict[str, Any]]
-"""Places of a point, (n, 2), m from O2, and the look of its path."""
 
 
 def label_plane(axes: "Axes", view: View, title: str) -> None:
@@ -56,7 +49,7 @@ def label_plane(axes: "Axes", view: View, title: str) -> None:
 
 def draw_bar(axes: "Axes", bar: int, ends: Any, **look: Any) -> None:
     """Draw a bar as a broad line between its pins."""
-    look = {"color": BAR_COLOURS[bar], "lw": BAR_WIDTH, "zorder": 4} | look
+    look = {"color": BAR_COLOURS[bar], "lw": 4.5, "zorder": 4} | look
     plot_points(axes, ends, solid_capstyle="round", **look)
 
 
@@ -82,7 +75,7 @@ def draw_mechanism(
     `moving`: with the arrows of velocity and acceleration.
     """
     scene = view.scene.settled()
-    pose = pose_of(view, solution, index)
+    pose = Pose(view, solution, index)
     middle = sum(pose.pins.values()) / 4.0
 
     def join_to_bar(bar: int, at: complex) -> None:
@@ -92,7 +85,8 @@ def draw_mechanism(
     for bar in MOVING_BARS:
         start, stop = ends = [pose.pins[pin] for pin in ENDS[bar]]
         draw_bar(axes, bar, ends)
-        named_at = start + _NAMED_AT * (stop - start)
+        # beside the middle, where a mass centre often is
+        named_at = start + 0.35 * (stop - start)
         name = _write_bar_name(view, bar)
         add_label(axes, name, named_at, named_at - middle, BAR_COLOURS[bar], 9.0)
     draw_pins(axes, pose.pins, middle)
@@ -192,7 +186,7 @@ def draw_linkage(axes: "Axes", view: View, *, moving: bool = False) -> None:
             outline = factor * np.append(corners, corners[0])
             plot_points(axes, outline, color=POINT, lw=0.6, zorder=2)
     if view.dimensions:
-        pins = pose_of(view, view.here, 0).pins
+        pins = Pose(view, view.here, 0).pins
         middle = 0.5 * (pins["O2"] + pins["O4"])
         add_label(
             axes, _write_bar_name(view, 1), middle, middle - pins["B"], MUTED, 9.0
@@ -204,23 +198,22 @@ def draw_linkage(axes: "Axes", view: View, *, moving: bool = False) -> None:
 
 def draw_frame(axes: "Axes", view: View) -> None:
     """Draw what does not move: paths of points, ground line and supports."""
-    _draw_paths(axes, view, _list_paths(view))
-    plane = view.plane
-    pins = pose_of(view, view.here, 0).pins
-    ends = pins["O2"], pins["O4"]
+    _draw_paths(axes, view)
+    pose = Pose(view, view.here, 0)
+    ends = pose.pins["O2"], pose.pins["O4"]
     plot_points(axes, ends, **GROUND_LINE)
     for pin in ends:
-        draw_support(axes, pin, plane.size)
+        draw_support(axes, pin, pose.plane.size)
 
 
-def _draw_paths(axes: "Axes", view: View, paths: Iterable[Path]) -> None:
-    for path, look in paths:
-        look_of_path = {"lw": 1.0, "zorder": 2} | look
-        plot_points(axes, view.plane.place(join_points(path)), **look_of_path)
+def _draw_path(axes: "Axes", view: View, path: Array, **look: Any) -> None:
+    """Draw the path of a point, (n, 2), m from O2."""
+    look = {"lw": 1.0, "zorder": 2} | look
+    plot_points(axes, view.plane.place(join_points(path)), **look)
 
 
-def _list_paths(view: View) -> Iterator[Path]:
-    """List paths of A, B, mass centres and the scene's points.
+def _draw_paths(axes: "Axes", view: View) -> None:
+    """Draw paths of A, B, mass centres and the scene's points.
 
     The mid-point of a massless coupler stands for its mass centre.
     """
@@ -243,7 +236,7 @@ def _list_paths(view: View) -> Iterator[Path]:
     for name, points in sweep.points.items():
         paths.append((points, POINT, (3, 1, 1, 1), f"path of {name}"))
     for path, colour, dashes, name in paths:
-        yield path, {"color": colour, "ls": (0, dashes), "label": name}
+        _draw_path(axes, view, path, color=colour, ls=(0, dashes), label=name)
 
 
 _COUPLER_LOOKS: tuple[tuple[str, Any], ...] = (
@@ -264,9 +257,9 @@ def draw_coupler_curves(axes: "Axes", view: View) -> None:
     If it has none, they are of points along its line and off it.
     """
     names = [point.name for point in view.scene.points if point.bar == 3]
-    _draw_paths(axes, view, _list_coupler_paths(view.trace(), names))
+    _draw_coupler_paths(axes, view, names)
     faint: dict[str, Any] = {"color": MUTED, "alpha": 0.55, "zorder": 2}
-    pins = pose_of(view, view.here, 0).pins
+    pins = Pose(view, view.here, 0).pins
     A, B = pins["A"], pins["B"]
     for bar in MOVING_BARS:
         draw_bar(axes, bar, [pins[pin] for pin in ENDS[bar]], lw=2.5, **faint)
@@ -292,8 +285,9 @@ def draw_coupler_curves(axes: "Axes", view: View) -> None:
     view.notes.append(f"The linkage is drawn at {view.at}.")
 
 
-def _list_coupler_paths(sweep: Solution, names: list[str]) -> Iterator[Path]:
-    """List the paths of points of the coupler, with their looks."""
+def _draw_coupler_paths(axes: "Axes", view: View, names: list[str]) -> None:
+    """Draw the paths of points of the coupler, or of some along it and off it."""
+    sweep = view.trace()
     along = sweep.B - sweep.A
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     paths = {"$A$": sweep.A}
@@ -309,7 +303,7 @@ def _list_coupler_paths(sweep: Solution, names: list[str]) -> Iterator[Path]:
     looks = cycle(_COUPLER_LOOKS)
     for (name, path), (colour, dashes) in zip(paths.items(), looks, strict=False):
         width = 1.8 if name in (*names, "0.5") else 1.1
-        yield path, {"color": colour, "ls": dashes, "label": name, "lw": width}
+        _draw_path(axes, view, path, color=colour, ls=dashes, label=name, lw=width)
 
 
 FARTHEST_CENTRE = 1.5
@@ -326,7 +320,7 @@ def draw_centres(axes: "Axes", view: View) -> None:
             path = derive(solution, name) - view.scene.origin
             is_near = np.hypot(*path.T) <= reach
             near = np.where(is_near[:, None], path, np.nan)
-            _draw_paths(axes, view, [(near, {"color": colour} | look)])
+            _draw_path(axes, view, near, color=colour, **look)
     draw_mechanism(axes, view, view.here, 0)
     axes.grid(color=MUTED, alpha=0.2)
     label_plane(axes, view, f"Instant centres at {view.at}")

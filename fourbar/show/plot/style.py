@@ -38,30 +38,20 @@ BAR_DASHES: dict[int, Any] = {
     3: (0, (5, 1.6)),
     4: (0, (7, 1.6, 1.4, 1.6)),
 }
-FORCE_COLOURS = {
-    "F12": "#0072B2",
-    "F32": "#D55E00",
-    "F43": "#8A3B78",
-    "F14": "#007A5A",
+BAR_LINES: dict[int, dict[str, Any]] = {
+    bar: {"color": colour, "ls": BAR_DASHES[bar]} for bar, colour in BAR_COLOURS.items()
 }
-_FORCE_LINES: dict[str, tuple[Any, float]] = {
-    "F12": ("-", 2.6),
-    "F32": ((0, (5, 1.6)), 2.0),
-    "F43": ((0, (1.4, 1.4)), 1.6),
-    "F14": ((0, (7, 1.6, 1.4, 1.6)), 1.1),
+"""Looks of the curves of bars."""
+FORCE_LINES: dict[str, dict[str, Any]] = {
+    "F12": {**BAR_LINES[2], "lw": 2.6},
+    "F32": {**BAR_LINES[3], "lw": 2.0},
+    "F43": {"color": POINT, "ls": (0, (1.4, 1.4)), "lw": 1.6},
+    "F14": {**BAR_LINES[4], "lw": 1.1},
 }
-"""Dashes and width. Thick beneath thin: forces that are equal still show all lines."""
-
-
-def choose_bar_line(bar: int) -> dict[str, Any]:
-    """Return the style of the curve of a bar."""
-    return {"color": BAR_COLOURS[bar], "ls": BAR_DASHES[bar]}
-
-
-def choose_force_line(name: str) -> dict[str, Any]:
-    """Return the style of the curve of a pin force."""
-    dashes, width = _FORCE_LINES[name]
-    return {"color": FORCE_COLOURS[name], "ls": dashes, "lw": width}
+"""Looks of the curves of pin forces. Thick beneath thin: forces that are equal still
+show all lines.
+"""
+FORCE_COLOURS = {name: look["color"] for name, look in FORCE_LINES.items()}
 
 
 def write_force_name(name: str) -> str:
@@ -94,15 +84,6 @@ GROUND_LINE: dict[str, Any] = {
 """The line of the ground."""
 Points = ComplexArray
 """Points of a drawing as complex numbers x + iy."""
-_HEADED: dict[str, Any] = {
-    "arrowstyle": "-|>",
-    "mutation_scale": 10.0,
-    "lw": 1.5,
-    "shrinkA": 0.0,
-    "shrinkB": 0.0,
-    "zorder": 8,
-}
-"""Look of an arrow."""
 # else its notes on a home without rights, where it has no cache, go to standard error
 logging.getLogger("matplotlib").addHandler(logging.NullHandler())
 STYLE_FILE = Path(__file__).with_name("fourbar.mplstyle")
@@ -169,12 +150,6 @@ what draws SVG but is no browser does not read it.
 """
 
 
-def add_dark_form(svg: bytes) -> bytes:
-    """Give an SVG file the form that readers of dark pages see."""
-    head, tag, rest = svg.partition(b"<defs>")
-    return head + _DARK_FORM + tag + rest
-
-
 class Drawing:
     """A figure that a notebook shows, and that `save` writes."""
 
@@ -189,9 +164,15 @@ class Drawing:
 
         The file is written atomically.
         """
-        file_format = format_of(path)
+        write_bytes(Path(path), self.render(format_of(path)))
+
+    def render(self, file_format: str) -> bytes:
+        """Return the bytes of a file; an SVG file has a form for dark pages too."""
         drawn = self._render(file_format)
-        write_bytes(Path(path), add_dark_form(drawn) if file_format == "svg" else drawn)
+        if file_format != "svg":
+            return drawn
+        head, tag, rest = drawn.partition(b"<defs>")
+        return head + _DARK_FORM + tag + rest
 
     def _render(self, file_format: str) -> bytes:
         buffer = io.BytesIO()
@@ -242,25 +223,32 @@ def draw_arrow(
 
     if tail == tip:
         return
-    ends = split_complex(tail), split_complex(tip)
-    look = {**_HEADED, "color": colour, **look}
-    axes.add_patch(FancyArrowPatch(*ends, clip_on=False, **look))
+    ends = split_points([tail, tip])
+    arrow = FancyArrowPatch(
+        *ends,
+        arrowstyle="-|>",
+        mutation_scale=10.0,
+        lw=1.5,
+        shrinkA=0.0,
+        shrinkB=0.0,
+        zorder=8,
+        color=colour,
+        clip_on=False,
+        **look,
+    )
+    axes.add_patch(arrow)
     axes.update_datalim(ends)
 
 
 def largest_magnitude(*values: Array) -> float:
     """Return the largest finite magnitude, or 0."""
-    flat = np.concatenate([np.abs(np.ravel(value)) for value in values])
-    flat = flat[np.isfinite(flat)]
-    return float(flat.max()) if flat.size else 0.0
+    sizes = np.abs(np.concatenate([*map(np.ravel, values)]))
+    return float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
 
 
 def find_peak_index(values: Array) -> int:
     """Return the index of the largest finite magnitude; one is finite."""
     return int(np.argmax(np.where(np.isfinite(values), np.abs(values), -1.0)))
-
-
-_RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, str]:
@@ -272,7 +260,9 @@ def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, s
     power = math.floor(math.log10(factor * largest)) if largest > 0.0 else 0
     if -4 < power < 5:
         return factor, name
-    named = f"10{str(power).translate(_RAISED_CHARACTERS)} {name}"
+    named = (
+        f"10{str(power).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))} {name}"
+    )
     return factor / 10.0**power, named.removesuffix(" 1")
 
 

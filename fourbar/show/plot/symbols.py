@@ -35,7 +35,7 @@ from fourbar.show.plot.style import (
     plot_points,
     write_pin_name,
 )
-from fourbar.show.plot.view import DrawingPlane, View
+from fourbar.show.plot.view import View
 from fourbar.solution import Solution
 
 if TYPE_CHECKING:
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
 LOAD_COLOUR = "#8A3B78"
 SPRING = "#6b5b00"
-PIN_COLOUR = "#4d5b70"
 SYMBOL_COLOURS = {
     "force": LOAD_COLOUR,
     "moment": LOAD_COLOUR,
@@ -55,41 +54,25 @@ SYMBOL_COLOURS = {
     "spring": SPRING,
     "torsion": SPRING,
 }
-SYMBOL_SIZES = {
-    "force": 7.0,
-    "moment": 2.6,
-    "drive": 3.2,
-    "flywheel": 4.0,
-    "torsion": 2.2,
+_ARROW_SIZES = {"force": 7.0, "moment": 2.6, "drive": 3.2}
+"""Length of a force's arrow and radii of couples, in sizes of a support."""
+_RINGS = {
+    "viscous": (1.5, -0.4),
+    "friction": (1.8, 0.4),
+    "pin_friction": (1.8, 0.9),
+    "flywheel": (4.0, -1.0),
+    "torsion": (2.2, 0.0),
 }
-"""Length of an arrow and radii, in sizes of a support. Other rings around pins have
-RING_RADII.
+"""Radius of a ring, in sizes of a support, and the angle at which its name stands, rad.
+Several names at one pin do not meet.
 """
-RING_RADII = {"viscous": 1.5, "friction": 1.8, "pin_friction": 1.8}
-_NAME_ANGLES = {
-    "viscous": -0.4,
-    "friction": 0.4,
-    "pin_friction": 0.9,
-    "flywheel": -1.0,
-    "torsion": 0.0,
-}
-"""Angle at which a name stands around its ring, rad. Several names at one pin do not
-meet.
-"""
-_RING_OF_OTHERS, _NAME_OF_OTHERS = 2.1, 1.4
-"""Ring and name of what acts at pins and is not listed."""
+_RING_OF_OTHERS = (2.1, 1.4)
 SMALLEST, _SHARE = 0.5, 0.12
 """Least part of its size that a symbol at a pin keeps, and the part of the shortest bar
 there that it may take.
 """
 _ARROWS = {"v": ("#0B6E99", "velocity"), "a": ("#B3261E", "acceleration")}
-LONGEST_ARROW = 7.0
-"""Length of an arrow, in sizes of a support. The largest of the sweep has it; if values
-diverge, all that are as large.
-"""
 COILS = 7
-OPENING = math.radians(250.0)
-"""Extent of an arc with an arrow head."""
 
 
 class Symbol(NamedTuple):
@@ -204,16 +187,27 @@ def _join_ends(kind: str, name: str, line: Any) -> Symbol:
     return Symbol(kind, name, *start, end=end)
 
 
-class Pose(NamedTuple):
-    """Position of the linkage in the coordinates of a drawing."""
+class Pose:
+    """One position of a solution in the coordinates of a drawing."""
 
-    plane: DrawingPlane
-    u: dict[int, complex]
-    """Direction of each bar, 1 to 4."""
-    pins: dict[str, complex]
-    theta_2: float
-    torque: float
-    """N m; NaN where there is none."""
+    def __init__(self, view: View, solution: Solution, index: int) -> None:
+        linkage = view.scene.linkage
+        self.plane = view.plane
+        self.theta_2 = float(solution.theta_2[index])
+        self.u = {1: cmath.rect(1.0, linkage.ground_angle)}
+        """Direction of each bar, 1 to 4."""
+        for bar in MOVING_BARS:
+            self.u[bar] = cmath.rect(1.0, solution[f"theta_{bar}"][index])
+        self.pins: dict[str, complex] = {
+            "O2": self.plane.origin,
+            "A": self.plane.place(complex(*solution.A[index])),
+            "B": self.plane.place(complex(*solution.B[index])),
+            "O4": self.plane.place(linkage.ground * self.u[1]),
+        }
+        self.turn = 1.0
+        """Sign of the drive's torque; 1 where there is none."""
+        if solution.torque is not None and np.isfinite(solution.torque[index]):
+            self.turn = float(np.sign(solution.torque[index]))
 
     def shrink(self, pin: str) -> float:
         """Return the size of what stands around a pin, smaller at a short bar.
@@ -239,31 +233,6 @@ class Pose(NamedTuple):
         return self.point(symbol.bar, symbol.at) + self.plane.factor * symbol.beyond
 
 
-def pose_of(view: View, solution: Solution, index: int) -> Pose:
-    """Collect what a drawing needs of one position of a solution."""
-    linkage = view.scene.linkage
-    plane = view.plane
-    angles = {1: linkage.ground_angle}
-    for bar in MOVING_BARS:
-        angles[bar] = float(getattr(solution, f"theta_{bar}")[index])
-    pins = {
-        "O2": 0.0j,
-        "A": complex(*solution.A[index]),
-        "B": complex(*solution.B[index]),
-        "O4": cmath.rect(linkage.ground, linkage.ground_angle),
-    }
-    torque = math.nan
-    if solution.torque is not None:
-        torque = float(solution.torque[index])
-    return Pose(
-        plane,
-        {bar: cmath.rect(1.0, angle) for bar, angle in angles.items()},
-        {pin: plane.place(place) for pin, place in pins.items()},
-        angles[2],
-        torque,
-    )
-
-
 class _Pen(NamedTuple):
     """Draws one symbol at one position."""
 
@@ -274,7 +243,7 @@ class _Pen(NamedTuple):
     @property
     def colour(self) -> str:
         """Colour of the symbol."""
-        return SYMBOL_COLOURS.get(self.symbol.kind, PIN_COLOUR)
+        return SYMBOL_COLOURS.get(self.symbol.kind, "#4d5b70")
 
     def draw_line(self, points: Any, width: float) -> None:
         """Draw a line over the supports and under the bars."""
@@ -315,18 +284,16 @@ def _draw_couple(pen: _Pen) -> None:
     """Draw a moment, or the torque of the drive, as an arrow that turns."""
     symbol = pen.symbol
     pose = pen.pose
+    turn = pose.turn
+    centre = pose.tail(symbol)
     if symbol.kind == "moment":
-        centre = pose.tail(symbol)
         turn = math.copysign(1.0, symbol.moment) * symbol.sign(pose.theta_2)
-    else:
-        centre = pose.pins[symbol.pin]
-        if symbol.bar == 3:
-            centre = 0.5 * (pose.pins["A"] + pose.pins["B"])
-        turn = 1.0 if math.isnan(pose.torque) else float(np.sign(pose.torque))
+    elif symbol.bar == 3:
+        centre = 0.5 * (pose.pins["A"] + pose.pins["B"])
     if turn == 0.0:
         return
-    radius = SYMBOL_SIZES[symbol.kind] * pose.shrink(FIRST_PIN[symbol.bar])
-    angles = math.radians(-35.0) * turn + turn * np.linspace(0.0, OPENING, 40)
+    radius = _ARROW_SIZES[symbol.kind] * pose.shrink(FIRST_PIN[symbol.bar])
+    angles = turn * np.radians(np.linspace(-35.0, 215.0, 40))
     points = centre + radius * np.exp(1j * angles)
     pen.draw_line(points, 1.5)
     before_last, last = points[-2:]
@@ -339,15 +306,14 @@ def _draw_ring(pen: _Pen) -> None:
     symbol = pen.symbol
     pose = pen.pose
     kind = symbol.kind
-    pin = symbol.pin or FIRST_PIN[symbol.bar]
     centre = pose.pins.get(symbol.pin, pose.point(symbol.bar, symbol.at))
-    relative = RING_RADII.get(kind) or SYMBOL_SIZES.get(kind, _RING_OF_OTHERS)
-    radius = pose.shrink(pin) * relative
+    relative, angle = _RINGS.get(kind, _RING_OF_OTHERS)
+    radius = pose.shrink(symbol.pin or FIRST_PIN[symbol.bar]) * relative
     inner, turns = (0.3, 2.5) if kind == "torsion" else (1.0, 1.0)
     radii = np.linspace(inner * radius, radius, 90)
     ring = centre + radii * np.exp(1j * np.linspace(0.0, turns * math.tau, 90))
     pen.draw_line(ring, 2.2 if kind == "flywheel" else 1.2)
-    away = cmath.rect(radius, _NAME_ANGLES.get(kind, _NAME_OF_OTHERS))
+    away = cmath.rect(radius, angle)
     pen.write_name(centre + away, away)
 
 
@@ -355,7 +321,7 @@ def _draw_force(pen: _Pen) -> None:
     """Draw an arrow of one length at the place where a force acts."""
     symbol = pen.symbol
     pose = pen.pose
-    size = symbol.sign(pose.theta_2) * SYMBOL_SIZES["force"] * pose.plane.size
+    size = symbol.sign(pose.theta_2) * _ARROW_SIZES["force"] * pose.plane.size
     if size == 0.0 or symbol.vector == 0.0:
         return
     axes = pose.u[symbol.bar] if symbol.turns else 1.0
@@ -399,6 +365,8 @@ def draw_vectors(axes: "Axes", view: View, solution: Solution, index: int) -> No
             foot = plane.factor * complex(*derive(solution, name)[index])
             shaft = complex(*derive(solution, f"{letter}_{name}")[index])
             if shaft:
-                shaft *= LONGEST_ARROW * plane.size / max(abs(shaft), top)
+                # length of an arrow, in sizes of a support. The largest of the sweep
+                # has it; if values diverge, all that are as large.
+                shaft *= 7.0 * plane.size / max(abs(shaft), top)
             draw_arrow(axes, foot, foot + shaft, colour)
         axes.plot([], [], color=colour, label=label)

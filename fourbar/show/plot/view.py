@@ -14,7 +14,6 @@ import numpy as np
 from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import LimitPosition, find_circuit, limit_positions
-from fourbar.formulas.motion import State
 from fourbar.formulas.points import list_circuit
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, Array
@@ -35,14 +34,6 @@ _BINDING = re.compile(r" (?==)|(?<==) |(?<=[\d]) (?=[A-Za-zµ])|(?<=N) (?=m\b)")
 CLEAR = 0.3
 """Motion and drive condition that the drawn position should have. Next to a pole forces
 dwarf all others.
-"""
-_LEAD = math.radians(60.0)
-"""Angle of the drawn position from the first that is well conditioned, rad. In a
-shorter sweep it is half of the sweep.
-"""
-BARREL = 0.85
-"""Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
-comes out of it.
 """
 STEPS_OF_A_PATH = 36_000
 """Steps along a circuit, a multiple of 4: near a small transmission angle a degree may
@@ -128,15 +119,14 @@ class View:
         extent = max(np.ptp(reached.real), np.ptp(reached.imag))
         barrel = 0.0
         if sweep.stroke is not None:
-            barrel = BARREL * factor * float(np.nanmin(sweep.stroke))
+            # the barrel is a little shorter than the shortest stroke of the sweep
+            barrel = 0.85 * factor * float(np.nanmin(sweep.stroke))
         size = 0.03 * factor * float(extent)
-        first_pin = {2: 0j, 3: join_points(sweep.A), 4: O4}
+        state = compute_shown_state(self.scene, sweep.at)
         for load in self.scene.settled().loads:
-            if load.bar in first_pin:
-                foot = load.foot(bars.bar(load.bar).to_centre)
-                turned = foot * np.exp(1j * sweep[f"theta_{load.bar}"])
-                arm = 0j if load.arm is None else cmath.rect(*load.arm)
-                reached = np.append(reached, first_pin[load.bar] + turned + arm)
+            foot = load.foot(bars.bar(load.bar).to_centre)
+            arm = 0j if load.arm is None else cmath.rect(*load.arm)
+            reached = np.append(reached, state.point(load.bar, foot) + arm)
         highest = complex(np.nanmax(reached.real), np.nanmax(reached.imag))
         corner = factor * highest + 2.0 * size
         return DrawingPlane(factor, unit, origin, origin + corner, size, barrel)
@@ -211,10 +201,6 @@ class View:
             )
             text += f"; with it the {drive.name} is between {low} and {high}"
         self.note(f"{text}.")
-
-    def state(self) -> State:
-        """Return the kinematics at the position drawn."""
-        return compute_shown_state(self.scene, self.here.at)
 
 
 class Axis(NamedTuple):
@@ -310,8 +296,7 @@ def list_sweep(scene: Scene) -> tuple[Command, float | None]:
         middle = 0.5 * (wide.angle[0] + wide.angle[-1])
         turns = np.round((middle - stated.angle) / math.tau)
         place = place + turns * math.tau
-    places = np.unique(np.concatenate([wide.places, place]))
-    return command_at(scene, places), float(place[0])
+    return command_at(scene, np.union1d(wide.places, place)), float(place[0])
 
 
 def find_drawn_place(scene: Scene) -> float | None:
@@ -392,11 +377,10 @@ def _view_motion(sweep: Solution, position: float | None) -> View:
     if position is None:
         index = int(np.argmax(sweep.assembled))
     else:
-        low = math.degrees(np.min(angle))
-        high = math.degrees(np.max(angle))
-        if not low <= math.degrees(position) <= high:
+        low, wanted, high = np.degrees([np.min(angle), position, np.max(angle)])
+        if not low <= wanted <= high:
             raise NotAssembledError(
-                f"the motion does not pass {name} = {math.degrees(position):.6g} deg:"
+                f"the motion does not pass {name} = {wanted:.6g} deg:"
                 f" it stays within {low:.6g} and {high:.6g} deg"
             )
         index = int(np.argmin(np.abs(angle - position)))
@@ -415,5 +399,5 @@ def _choose_position(sweep: Solution) -> float:
     good = sweep.at.places[quality >= min(CLEAR, float(quality.max()))]
     lead = 0.5 * float(np.ptp(good))
     if not sweep.at.moves_stroke:
-        lead = min(_LEAD, lead)
+        lead = min(math.radians(60.0), lead)
     return float(good[np.argmin(np.abs(good - good[0] - lead))])

@@ -307,7 +307,7 @@ def test_the_check_runs_in_a_process_of_its_own_reports_and_can_be_stopped(
         return not about.get("check", {"running": True})["running"]
 
     async def ask(made, address):
-        folder = made.session.exports.folder
+        folder = made.session.exports
         folder.mkdir()
         report = folder / "check" / "report.html"
         line = await page(address)

@@ -617,7 +617,7 @@ def test_a_session_goes_on_where_it_stopped(session):
     if os.name == "posix":  # the scene may be its owner's alone
         assert session.state_file.stat().st_mode & 0o077 == 0
     assert session.token not in session.state_file.read_text()
-    again = Session(session.path, session.exports.folder)
+    again = Session(session.path, session.exports)
     assert again.token != session.token
     assert (again.now.text, again.kept) == (session.now.text, session.kept)
     assert again.compared()["compared"] == "state 1"
@@ -660,7 +660,7 @@ def test_a_damaged_state_file_is_one_line(session, pattern, damage):
     session.state_file.write_text(damaged)
     said = "cannot be read as a state of the workbench"
     with refused(str(session.state_file), said, "remove it"):
-        Session(session.path, session.exports.folder)
+        Session(session.path, session.exports)
 
 
 def test_the_history_and_what_is_kept_do_not_grow_without_end(session, monkeypatch):
@@ -670,7 +670,7 @@ def test_the_history_and_what_is_kept_do_not_grow_without_end(session, monkeypat
     for _ in range(MOST_KEPT + 5):
         ask(session, "keep")
     session.write_state_file()
-    again = Session(session.path, session.exports.folder)
+    again = Session(session.path, session.exports)
     assert again.now.text == session.now.text
     assert [len(again.texts), len(again.kept)] == [5, MOST_KEPT]
     assert "start" in again.kept and f"state {MOST_KEPT + 5}" in again.kept
@@ -682,7 +682,7 @@ def test_the_history_and_what_is_kept_do_not_grow_without_end(session, monkeypat
 def test_exports_go_into_their_folder_under_their_own_names(session):
     for name, ending in (("csv", "csv"), ("mjcf", "xml"), ("page", "html")):
         ask(session, "export", format=name)
-        assert (session.exports.folder / f"scene.{ending}").stat().st_size > 1000
+        assert (session.exports / f"scene.{ending}").stat().st_size > 1000
 
 
 @mark.parametrize(

@@ -58,7 +58,7 @@ def test_symbols_stand_where_the_formulas_let_them_act(everything, index):
     solution = solve(everything)
     shown = view.make_view(everything)
     shown.units = fourbar.units("m")
-    pose = symbols.pose_of(shown, solution, index)
+    pose = symbols.Pose(shown, solution, index)
     axes = Figure().subplots()
 
     def ends(name):
@@ -92,7 +92,7 @@ def test_the_arrow_of_a_moment_turns_as_the_moment_does(moment):
     (symbol,) = (one for one in list_acting(scene) if one.kind == "moment")
     shown = view.make_view(scene)
     axes = Figure().subplots()
-    symbols.draw_symbol(axes, symbol, symbols.pose_of(shown, shown.here, 0))
+    symbols.draw_symbol(axes, symbol, symbols.Pose(shown, shown.here, 0))
     x, y = axes.lines[0].get_data()
     area = np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])  # about O2
     middle_x, middle_y = np.mean([x, y], axis=1)
