@@ -6,8 +6,7 @@ drives, springs and effects follow the declarations of their fields.
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from itertools import cycle
 from typing import Any, Self
 
@@ -160,11 +159,8 @@ class Entry:
         try:
             return by.check(self.key, value)
         except InputError as error:
-            wrong = self.holding(error.value)
-            for entry in entries:
-                if entry.value == error.value:
-                    wrong = entry
-                    break
+            alike = (entry for entry in entries if entry.value == error.value)
+            wrong = next(alike, self.holding(error.value))
             allowed = error.allowed
             if wrong.value == DRAWN_WORD:
                 of = "an angle, a stroke or a side directly under [motion] alone"
@@ -214,14 +210,12 @@ class Entry:
         for field in fields:
             if field.name not in stated:
                 stated[field.name] = self._read_field(field)
-        with self._knowing(kind.stated_at):
-            return make(**stated)
+        return self._make(make, stated, kind.stated_at)
 
-    @contextmanager
-    def _knowing(self, section: str) -> Iterator[None]:
-        """Name the file and the key in errors of one description of a section."""
+    def _make(self, make: Any, stated: dict[str, Any], section: str) -> Any:
+        """Make a description; errors name the file, and the key in it."""
         try:
-            yield
+            return make(**stated)
         except InputError as error:
             if error.file or "{" in section:
                 raise
@@ -256,11 +250,10 @@ class Entry:
         """Read what each pin has: one number, or a table of several."""
         rows = []
         for pin in self.table(PINS):
-            if "" not in numbers:
-                self[pin].table(numbers)
-                stated = self[pin]
-            else:
-                stated = self[pin].holding({"": self.value[pin]})
+            stated = self[pin]
+            if "" in numbers:
+                stated = stated.holding({"": stated.value})
+            stated.table(numbers)
             rows.append((pin, *stated.numbers(numbers).values()))
         return tuple(rows)
 

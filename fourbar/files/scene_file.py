@@ -162,7 +162,11 @@ def parse_tables(text: str, name: str) -> dict[str, Any]:
     except RecursionError:
         raise InputError("TOML", "...", "is nested too deeply", shown) from None
     except ValueError as error:  # TOMLDecodeError, and numbers that Python refuses
-        raise _explain_unreadable(text, str(error), shown) from None
+        reason = " ".join(str(error).split())
+        place = re.search(r"line (\d+)", reason)
+        line = text.split("\n")[int(place[1]) - 1] if place else text
+        allowed = f'{reason[:120]}; a number with a unit stands in quotes, like "9 in"'
+        raise InputError("TOML", line.strip()[:60], allowed, shown) from None
 
 
 def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:
@@ -182,16 +186,6 @@ def _write_name(name: str) -> str:
     return name if name.isprintable() else repr(name)
 
 
-def _explain_unreadable(text: str, reason: str, shown: str) -> InputError:
-    """Make the error for what the TOML reader stumbles over, with its line."""
-    place = re.search(r"line (\d+)", reason)
-    line = text.split("\n")[int(place[1]) - 1] if place else text
-    why = " ".join(reason.split())[:120]
-    allowed = f'{why}; a number with a unit stands in quotes, like "9 in"'
-    # characters shown of a line that cannot be read
-    return InputError("TOML", line.strip()[:60], allowed, shown)
-
-
 def read_scene(document: Entry, folder: str) -> Scene:
     """Read the scene of a file's tables; `folder`: of its pictures."""
     document.table(_TABLES)
@@ -199,7 +193,11 @@ def read_scene(document: Entry, folder: str) -> Scene:
     drawn = drawing or read_ground(document["lengths"])
     top = document.holding(_TABLES | document.value)
     top.file.drawing = drawn
-    points = _read_points(top["points"])
+    named = top["points"]
+    if not isinstance(named.value, dict) or len(named.value) > MOST_POINTS_OF_A_SCENE:
+        allowed = f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
+        raise named.refuse(allowed)
+    points = tuple(named[name].described(Point, name=name) for name in named.value)
     top.file.bars = {point.name: point.bar for point in points}
     drive_bar, drive = _read_drive(top["drive"])
     loads = top["loads"]
@@ -210,18 +208,14 @@ def read_scene(document: Entry, folder: str) -> Scene:
     lengths, met = _read_lengths(top, drawn)
     bars = top["bars"]
     bars.table(MOVING_BAR_NUMBERS)
-    ground, *moving = met
-    two, three, four = (
-        _read_bar(bars[name], length, number)
-        for (name, number), length in zip(
-            MOVING_BAR_NUMBERS.items(), moving, strict=True
-        )
-    )
-    linkage = FourBar(ground, two, three, four, drawn.angle(1))
+    moving = dict[str, Any]()
     pictures = []
-    for name, bar in MOVING_BAR_NUMBERS.items():
+    for name, number in MOVING_BAR_NUMBERS.items():
+        moving[name] = _read_bar(bars[name], met[number - 1], number)
         if "picture" in bars.value.get(name, {}):  # its file is read when it is shown
-            pictures.append(Picture(bar, bars[name]["picture"].check(Text()), folder))
+            shown = bars[name]["picture"].check(Text())
+            pictures.append(Picture(number, shown, folder))
+    linkage = FourBar(met[0], **moving, ground_angle=drawn.angle(1))
     settled = drive and drive.with_places(settler(linkage, points))
     motion = _read_motion(top["motion"], drawing, settled)
     stated_loads = tuple(map(_read_load, loads.entries()))
@@ -275,14 +269,6 @@ def _read_drive(drive: Entry) -> tuple[int | None, ForceDrive | None]:
             return bar, None
         raise drive["point"].refuse(_A_POINT)
     return None, drive.described(PointDrive)
-
-
-def _read_points(points: Entry) -> tuple[Point, ...]:
-    if not isinstance(points.value, dict) or len(points.value) > MOST_POINTS_OF_A_SCENE:
-        raise points.refuse(
-            f"must be a table of points, at most {MOST_POINTS_OF_A_SCENE}"
-        )
-    return tuple(points[name].described(Point, name=name) for name in points.value)
 
 
 def _read_lengths(top: Entry, drawn: DrawnPins | DrawnGround) -> tuple[Any, Any]:
@@ -342,27 +328,21 @@ def _read_motion(
             motion.file.drawn["side"] = find_side_of_cylinder(drawing, drive)
     arguments: dict[str, Any] = {}
     for name, by in Motion.numbers.items():
-        stated = motion[name]
-        if stated.value is None:
-            continue
-        arguments[name] = _read_commanded(stated, by.unit)
+        if name in entry:
+            arguments[name] = _read_commanded(motion[name], by.unit)
     for name, words in (("branch", BRANCH_OF_NAME), ("side", SIDES)):
         if name in motion.value:
             arguments[name] = motion[name].check(OneOf((*words,)))
     if "free" in entry:
         arguments["free"] = motion["free"].described(Free)
     if "law" in entry:
-        arguments["law"] = _read_law(motion["law"])
+        law = motion["law"]
+        form: Any = Law  # a table of instants
+        if isinstance(law.value, dict) and "kind" in law.value:
+            kind = law["kind"].check(OneOf(LAW_KINDS))
+            form = Sine if kind == SINE_LAW else Rise
+        arguments["law"] = law.described(form)
     return Motion(**arguments)
-
-
-def _read_law(entry: Entry) -> Law | Rise | Sine:
-    """Read a table; a sine; or a rise, a dwell, a fall and a rest by a standard law."""
-    law: Any = Law
-    if isinstance(entry.value, dict) and "kind" in entry.value:
-        kind = entry["kind"].check(OneOf(LAW_KINDS))
-        law = Sine if kind == SINE_LAW else Rise
-    return entry.described(law)  # type: ignore[no-any-return]
 
 
 def _read_commanded(entry: Entry, unit: str) -> float | Array | Sweep | FromLimit:
@@ -425,14 +405,14 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
             raise tolerance.refuse(allowed)
         unit = entries[key].unit
         sigma = isinstance(stated, list)
-        if sigma and (len(stated) != 2 or stated[1] != SIGMA):
-            form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
-            raise tolerance.refuse(f"must be like {form}")
-        width = tolerance.holding(stated[0] if sigma else stated)
-        size = width.check(Declared(unit, POSITIVE))
-        read = Tolerance(key, size, sigma)
+        if sigma:
+            if len(stated) != 2 or stated[1] != SIGMA:
+                form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
+                raise tolerance.refuse(f"must be like {form}")
+            tolerance.value = stated[0]
+        read = Tolerance(key, tolerance.check(Declared(unit, POSITIVE)), sigma)
         if (misfit := find_misfit(scene, entries[key], read)) is not None:
-            raise width.refuse(misfit)
+            raise tolerance.refuse(misfit)
         tolerances.append(read)
     if (overlap := find_overlap(flat.keys())) is not None:
         length, pin = overlap
@@ -452,5 +432,5 @@ def _flatten(table: Entry, value: object, before: str = "") -> dict[str, Any]:
         if isinstance(entry, dict):
             flat |= _flatten(table, entry, f"{before}{key}.")
         else:
-            flat[f"{before}{key}"] = entry
+            flat[before + key] = entry
     return flat

@@ -125,17 +125,20 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
 
     Raises InputError where a file cannot hold the effects.
     """
-    keys = [effect.key for effect in scene.effects]
     for effect in scene.effects:
         kind = type(effect)
         if list_kinds().get(effect.key) is not kind:
             allowed = "a scene file cannot state this effect"
             raise InputError(f"effects.{effect.key}", kind.__name__, allowed)
+    keys = [effect.key for effect in scene.effects]
     if len(set(keys)) < len(keys):
         allowed = "a scene file holds one effect of each kind"
         raise InputError("effects", keys, allowed)
     linkage = scene.linkage
-    lengths = zip(BAR_NAMES.values(), linkage.lengths, strict=True)
+    lengths = dict[str, Any]()
+    for name, length in zip(BAR_NAMES.values(), linkage.lengths, strict=True):
+        lengths[name] = write_quantity(length, "m")
+    lengths["ground_angle"] = write_quantity(linkage.ground_angle, "rad")
     bars = {}
     for name, number in MOVING_BAR_NUMBERS.items():
         bar = linkage.bar(number)
@@ -149,10 +152,7 @@ def list_scene_tables(scene: Scene) -> dict[str, Any]:
             bars[name] = numbers | last
     drive = {"bar": scene.drive_bar}
     return {
-        "lengths": {
-            **{name: write_quantity(length, "m") for name, length in lengths},
-            "ground_angle": write_quantity(linkage.ground_angle, "rad"),
-        },
+        "lengths": lengths,
         "bars": bars,
         "drive": drive if scene.drive is None else write_described(scene.drive),
         "points": {point.name: write_described(point) for point in scene.points},
@@ -168,27 +168,23 @@ def _write_motion(motion: Motion) -> dict[str, Any]:
     else:
         for name in motion.names:
             value = getattr(motion, name)
-            if value is not None:
-                stated[name] = _write_commanded(value, motion.numbers[name].unit)
+            unit = motion.numbers[name].unit
+            if isinstance(value, Sweep):
+                start = write_quantity(value.start, unit)
+                stop = write_quantity(value.stop, unit)
+                stated[name] = {"from": start, "to": stop, "steps": value.steps}
+            elif isinstance(value, FromLimit):
+                stated[name] = write_described(value)
+            elif isinstance(value, np.ndarray):
+                stated[name] = [write_quantity(number, unit) for number in value]
+            elif value is not None:
+                stated[name] = write_quantity(value, unit)
     stated["branch"] = BRANCH_NAMES[motion.branch]
     if motion.side is not None:
         stated["side"] = motion.side
     if motion.free is not None:
         stated["free"] = write_described(motion.free)
     return stated
-
-
-def _write_commanded(value: Any, unit: str) -> Any:
-    """Write a number with its unit, a list of them, or what stands for many."""
-    if isinstance(value, Sweep):
-        start = write_quantity(value.start, unit)
-        stop = write_quantity(value.stop, unit)
-        return {"from": start, "to": stop, "steps": value.steps}
-    if isinstance(value, FromLimit):
-        return write_described(value)
-    if isinstance(value, np.ndarray):
-        return [write_quantity(number, unit) for number in value]
-    return write_quantity(value, unit)
 
 
 def write_toml_value(key: str, value: object) -> str:
