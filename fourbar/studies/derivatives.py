@@ -208,14 +208,12 @@ class Sensitivity:
             change = step * slope
             if change.ndim == 2:
                 change = np.hypot(*change.T)
-            if np.isfinite(change).any():
-                worst = int(np.nanargmax(np.abs(change)))
+            sizes = np.nan_to_num(np.abs(change))
+            worst = int(np.argmax(sizes))
+            if sizes[worst] > rounding:
                 theta_2 = float(self.solution.theta_2[worst])
                 rows.append(_Influence(key, float(change[worst]), theta_2, worst))
-        return sorted(
-            (row for row in rows if abs(row.change) > rounding),
-            key=lambda row: -abs(row.change),
-        )
+        return sorted(rows, key=lambda row: -abs(row.change))
 
     def _find_step(self, entry: SceneNumber, number: float) -> float:
         """Return the change of a number for which its influence is reported.
@@ -295,25 +293,18 @@ def sensitivity(scene: Scene) -> Sensitivity:
     solution = solve(scene)
     moving = at.speed is not None
     keys = {theta: SceneNumber((), scene.motion.numbers[scene.motion.commanded].unit)}
+    of_positions = ("pins", "lengths", "points", "drive")
     for key, entry in list_entries(scene).items():
-        # beginnings of the keys of numbers on which positions depend
-        if (
-            moving
-            or key.startswith(("pins", "lengths", "points", "drive"))
-            or ".centre." in key
-        ):
+        if moving or key.startswith(of_positions) or ".centre." in key:
             keys[key] = entry
-    most = float(at.places.max()) if at.moves_stroke else np.nan
-    numbers = [
-        most if key == theta else read_number(scene, entry)
-        for key, entry in keys.items()
-    ]
-    if any(effect.loaded_pins for effect in scene.effects):
-        forces = FORCE_NAMES
-    else:
-        forces = (*FORCE_NAMES, "drive_condition")
+    # a commanded angle has no size of which a hundredth could be taken
+    numbers = [float(at.places.max()) if at.moves_stroke else np.nan]
+    numbers += [read_number(scene, entry) for entry in keys.values() if entry.place]
+    forces = [*FORCE_NAMES]
+    if not any(effect.loaded_pins for effect in scene.effects):
+        forces.append("drive_condition")
     if not np.any(at.stated[1]):  # what holds a linkage that stands
-        forces = (*forces, *DRY_FRICTION_QUANTITIES)
+        forces += DRY_FRICTION_QUANTITIES
     names = [
         name
         for name in solution.evaluated()
@@ -321,11 +312,8 @@ def sensitivity(scene: Scene) -> Sensitivity:
         or (moving and name in forces)
         or (name == "theta_2" and scene.motion.commanded != name)
     ]
-    names += [
-        f"{start}{p.name}"
-        for p in scene.points
-        for start in (POINT_STAGES if moving else ("",))
-    ]
+    stages = POINT_STAGES if moving else ("",)
+    names += [start + point.name for point in scene.points for start in stages]
     p = len(keys)
     by = {
         name: np.full((p, *find_values(solution, name).shape), np.nan) for name in names
@@ -341,12 +329,10 @@ def sensitivity(scene: Scene) -> Sensitivity:
         for number, (key, entry) in sorted(
             enumerate(keys.items()), key=lambda one: not moves_before_pins(*one[1])
         ):
-            if key.startswith("motion."):
-                continue
-            # what is left out carries the slope of its length too
-            seeded = replace_number(
-                seeded, entry, read_number(seeded, entry) + _make_unit_slope(number, p)
-            )
+            if not key.startswith("motion."):
+                # what is left out carries the slope of its length too
+                value = read_number(seeded, entry) + _make_unit_slope(number, p)
+                seeded = replace_number(seeded, entry, value)
         for start in range(0, len(regular), POSITIONS_AT_ONCE):
             index = regular[start : start + POSITIONS_AT_ONCE]
             marks = _derive(seeded, keys, at, index, by)
@@ -411,10 +397,8 @@ def _derive(
     place = {key: number for number, key in enumerate(keys)}
 
     def seeded(key: str, number: Any) -> Any:
-        number = np.broadcast_to(
-            np.asarray(0.0 if number is None else number, dtype=float),
-            stated.angle.shape,
-        )[index]
+        number = 0.0 if number is None else number
+        number = np.broadcast_to(number, stated.angle.shape)[index].astype(float)
         if key in place:
             return number + _make_unit_slope(place[key], len(keys))
         return Sloped(number, np.zeros((len(keys), 1)))
@@ -434,17 +418,14 @@ def _derive(
     if moving:
         actions = Actions(state, case.bodies)
         for pin in {pin for term in case.terms for pin in term.dry_pins}:
-            held |= ~np.broadcast_to(actions.turning(pin), held.shape) | (
-                take_values(speed) == 0.0
-            )
+            held |= ~np.broadcast_to(actions.turning(pin), held.shape)
+            held |= take_values(speed) == 0.0
         for term in case.terms:
             if isinstance(term, Springs):
                 off |= term.comes_off(state)
         dynamics = case.dynamics(state, acceleration)
-        quantities |= {
-            **dynamics.pins._asdict(),
-            case.drive_names.value: dynamics.effort,
-        }
+        quantities |= dynamics.pins._asdict()
+        quantities[case.drive_names.value] = dynamics.effort
         quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
         low, high = case.drive_names.low, case.drive_names.high

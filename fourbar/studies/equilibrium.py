@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -298,36 +298,26 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
-class _Grid(NamedTuple):
+class _Grid:
     """Places of the row, and which of them are neighbours."""
 
-    curve: CircuitCurve
-    places: Array
-    Q: Array
-    """Generalised force at each place."""
-    size: Array
-    """Sum of its absolute terms there or at a neighbour, whichever is larger."""
-    idle: Mask
-    """True where Q is nothing."""
-    gap: Array
-    """Distance to the next place along the row, rad."""
-    near: Mask
-    """True where no gap of the sweep lies between."""
-
-    @classmethod
-    def of(cls, curve: CircuitCurve, places: Array) -> Self:
+    def __init__(self, curve: CircuitCurve, places: Array) -> None:
         """Pair neighbouring places along the row, but not across a gap of the sweep."""
-        places = np.sort(places)
-        gap = np.remainder(np.roll(places, -1) - places, curve.period)
-        near = gap < 2.5 * curve.period / curve.positions
+        self.curve = curve
+        self.places = places = np.sort(places)
+        self.gap = np.remainder(np.roll(places, -1) - places, curve.period)
+        """Distance to the next place along the row, rad."""
+        self.near = near = self.gap < 2.5 * curve.period / curve.positions
+        """True where no gap of the sweep lies between."""
         points = curve.points(places)
         size = curve.size(points)
         after = np.where(near, np.roll(size, -1), 0.0)
         before = np.roll(np.where(near, size, 0.0), 1)
-        size = np.maximum(size, np.maximum(before, after))
-        Q = curve.generalized_force(points)
-        idle = np.abs(Q) <= ROUND_OFF_OF_Q * size
-        return cls(curve, places, Q, size, idle, gap, near)
+        self.size = np.maximum(size, np.maximum(before, after))
+        """Sum of the absolute terms of Q there or at a neighbour: the larger one."""
+        self.Q = curve.generalized_force(points)
+        self.idle = np.abs(self.Q) <= ROUND_OFF_OF_Q * self.size
+        """True where Q is nothing."""
 
     def locate(
         self,
@@ -362,7 +352,7 @@ def _find_zeros(curve: CircuitCurve, samples: Array) -> tuple[Array, Array]:
     range where Q is nothing. Returned are the places, (n,), and the sum of the absolute
     terms of Q about each, (n,).
     """
-    grid = _Grid.of(curve, samples)
+    grid = _Grid(curve, samples)
     both_idle = grid.near & grid.idle & np.roll(grid.idle, -1)
     alone = grid.idle & ~both_idle & ~np.roll(both_idle, 1)
     # at an end of the sweep nothing beyond shows a sign
@@ -370,21 +360,21 @@ def _find_zeros(curve: CircuitCurve, samples: Array) -> tuple[Array, Array]:
     zeros = grid.places[ending]
     sizes = grid.size[ending]
 
-    grid = _Grid.of(curve, grid.places[~alone])
+    grid = _Grid(curve, grid.places[~alone])
     one_sign = grid.Q * np.roll(grid.Q, -1) > 0.0
     least, Q_beside, size = grid.locate(curve.slope, one_sign)
     Q = curve.generalized_force(curve.points(least))
     touches = np.abs(Q) <= ROUND_OFF_OF_Q * size
-    zeros = np.concatenate([zeros, least[touches]])
-    sizes = np.concatenate([sizes, size[touches]])
+    zeros = np.append(zeros, least[touches])
+    sizes = np.append(sizes, size[touches])
 
     turns_back = least[(Q * Q_beside < 0.0) & ~touches]
-    grid = _Grid.of(curve, np.concatenate([grid.places, turns_back]))
+    grid = _Grid(curve, np.append(grid.places, turns_back))
     crossed, _, size = grid.locate(curve.generalized_force)
     Q = curve.generalized_force(curve.points(crossed))
     continuous = np.abs(Q) <= _A_JUMP * size
-    zeros = np.concatenate([zeros, crossed[continuous]])
-    sizes = np.concatenate([sizes, size[continuous]])
+    zeros = np.append(zeros, crossed[continuous])
+    sizes = np.append(sizes, size[continuous])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         away = np.abs(np.sin(0.5 * (curve.points(zeros) - point)))
         # nearer than 1e-4 rad nothing is decided: the curve crosses itself there

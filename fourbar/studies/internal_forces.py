@@ -84,7 +84,7 @@ def internal_forces(
         )
     if solution.theta_2.ndim != 1:
         raise InputError("solution", "a study", "must be of one scene: take one member")
-    beam = _collect_acting(scene, solution, bar)
+    beam = _Beam(scene, solution, bar)
     feet = beam.foot[solution.assembled]
     first = np.nanmin(feet, initial=0.0)
     last = np.nanmax(feet, initial=beam.length)
@@ -100,29 +100,55 @@ def internal_forces(
 
 def largest_bending(scene: Scene, solution: Solution, bar: int) -> Bending:
     """Compute the largest bending moment of a moving bar at each position."""
-    return _collect_acting(scene, solution, bar).find_largest()
+    return _Beam(scene, solution, bar).find_largest()
 
 
-class _Beam(NamedTuple):
-    """Forces and couples on a bar, by their feet on its line, (n, f).
+class _Beam:
+    """Forces and couples on a bar, by their feet on its line.
 
     The load that inertia and weight of a uniform bar spread over the line is included.
     """
 
-    length: float
-    foot: Array
-    force: ComplexArray
-    """Force in the bar's axes, x + i y."""
-    couple: Array
-    uniform: bool
-    density: float
-    """Mass per length of a uniform bar, kg/m; otherwise 0."""
-    pull: ComplexArray
-    """Acceleration of the first pin less gravity, in the bar's axes, m/s^2, (n, 1)."""
-    omega: Array
-    """rad/s, (n, 1)."""
-    alpha: Array
-    """rad/s^2, (n, 1)."""
+    @np.errstate(all="ignore")
+    def __init__(self, scene: Scene, solution: Solution, bar: int) -> None:
+        described = scene.linkage.bar(bar)
+        self.length = described.length
+        self.uniform = described.inertia is None and described.centre is None
+        self.density = described.mass / self.length if self.uniform else 0.0
+        """Mass per length of a uniform bar, kg/m; otherwise 0."""
+        zero = np.zeros(len(solution))
+        omega = zero + solution[f"omega_{bar}"]
+        alpha = zero + solution[f"alpha_{bar}"]
+        spread = "gravity" if self.uniform else ""
+        recorder = record_acting(scene, solution, bar, spread)
+        gravity = 0.0j
+        effects: tuple[Any, ...] = scene.effects
+        for effect in effects:
+            if effect.key == spread:
+                gravity = gravity + effect.field
+            if bar in effect.added_inertia:  # a flywheel turns about the ground pin
+                recorder.couple(bar, -effect.added_inertia[bar] * alpha)
+        back = np.conj(recorder.state.direction(bar))
+        pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
+        of_mass = -described.mass * (_join(solution[f"a_G{bar}"]) - gravity)
+        of_inertia = -described.moment_of_inertia * alpha
+        recorder.record(described.to_centre, of_mass * back, of_inertia)
+        supports = _support(recorder, solution)
+        if self.uniform:
+            recorder.items.pop()
+        columns = []
+        for _, _, place, force, couple in recorder.items + supports:
+            # with the couple of a force beside the line
+            beside = couple + cross(-force, 1j * np.imag(place))
+            columns.append(np.broadcast_arrays(np.real(place), force, beside, zero))
+        self.foot, self.force, self.couple, _ = (
+            np.stack(column, axis=1) for column in zip(*columns, strict=True)
+        )
+        """Feet, m, forces x + i y in the bar's axes, N, and couples, N m, (n, f)."""
+        self.pull = (pull * back)[:, None]
+        """Acceleration of the first pin less gravity, in the bar's axes, (n, 1)."""
+        self.omega = omega[:, None]
+        self.alpha = alpha[:, None]
 
     def at(self, x: Array, side: float = 1.0) -> tuple[Array, Array, Array]:
         """Compute N, V, M at x, (n, k).
@@ -264,7 +290,11 @@ def record_acting(
     case = Case.of(scene, solution.at.bar).begin_with(solution.at)
     state = case.at(solution.at)
     recorder = _Recorder(state, scene, bar)
-    _record_drive(recorder, scene, solution)
+    if scene.motion.free is None:
+        if solution.drive is not None:
+            solution.drive.act(recorder, solution.drive_force)
+        elif scene.drive_bar == bar:
+            recorder.couple(bar, solution.torque)  # at the bar's first pin
     pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
     terms: tuple[Any, ...] = case.terms
     for index, term in enumerate(terms):
@@ -280,54 +310,6 @@ def record_acting(
         recorder.place = 0.0j
         term.act_known(recorder, pin_forces)
     return recorder
-
-
-@np.errstate(all="ignore")
-def _collect_acting(scene: Scene, solution: Solution, bar: int) -> _Beam:
-    """Collect all that acts on a bar."""
-    described = scene.linkage.bar(bar)
-    G = described.to_centre
-    uniform = described.inertia is None and described.centre is None
-    zero = np.zeros(len(solution))
-    omega = zero + getattr(solution, f"omega_{bar}")
-    alpha = zero + getattr(solution, f"alpha_{bar}")
-    spread = "gravity" if uniform else ""
-    recorder = record_acting(scene, solution, bar, spread)
-    gravity = 0.0j
-    effects: tuple[Any, ...] = scene.effects
-    for effect in effects:
-        if effect.key == spread:
-            gravity = gravity + effect.field
-        if bar in effect.added_inertia:  # a flywheel turns about the ground pin
-            recorder.couple(bar, -effect.added_inertia[bar] * alpha)
-    back = np.conj(recorder.state.direction(bar))
-    pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
-    of_mass = -described.mass * (_join(getattr(solution, f"a_G{bar}")) - gravity)
-    of_inertia = -described.moment_of_inertia * alpha
-    recorder.record(G, of_mass * back, of_inertia)
-    supports = _support(recorder, solution)
-    if uniform:
-        recorder.items.pop()
-    columns = []
-    for _, _, place, force, couple in recorder.items + supports:
-        # with the couple of a force beside the line
-        beside = couple + cross(-force, 1j * np.imag(place))
-        columns.append(np.broadcast_arrays(np.real(place), force, beside, zero))
-    foot, force, couple, _ = (
-        np.stack(column, axis=1) for column in zip(*columns, strict=True)
-    )
-    density = described.mass / described.length if uniform else 0.0
-    return _Beam(
-        described.length,
-        foot,
-        force,
-        couple,
-        uniform,
-        density,
-        (pull * back)[:, None],
-        omega[:, None],
-        alpha[:, None],
-    )
 
 
 def _support(recorder: _Recorder, solution: Solution) -> list[Acting]:
@@ -356,17 +338,3 @@ def _support(recorder: _Recorder, solution: Solution) -> list[Acting]:
         across = np.where(np.isfinite(along), -moments / (x - x_other), np.nan)
         supports.append(Acting(-1, pin, x, along + 1j * across, 0.0))
     return supports
-
-
-def _record_drive(recorder: _Recorder, scene: Scene, solution: Solution) -> None:
-    """Record the couple of the drive at the bar's first pin.
-
-    If the drive exerts a force, that is recorded at its points.
-    """
-    if scene.motion.free is not None:
-        return
-    if scene.drive is not None:
-        assert solution.drive is not None
-        solution.drive.act(recorder, solution.drive_force)
-    elif scene.drive_bar == recorder.bar:
-        recorder.couple(recorder.bar, solution.torque)

@@ -14,7 +14,7 @@ from fourbar.formulas.mobility import TURN
 from fourbar.linkage import Whole, require_whole
 from fourbar.quantities import NOT_ASSEMBLED, Array, Indices, Mask
 from fourbar.scene import Scene, command
-from fourbar.solution import SHOWN_PARTS, find_values, is_scalar, split_parts
+from fourbar.solution import SHOWN_PARTS, find_values, split_parts
 from fourbar.solving import split
 from fourbar.studies.derivatives import Sensitivity, sensitivity
 from fourbar.studies.keys import (
@@ -187,13 +187,7 @@ def tolerances(
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns in split(n, max(1, EVALUATED_AT_ONCE // samples)):
         at = take_positions(study.at, slice(None), columns)
-        shape = at.angle.shape
-        out = {
-            name: np.empty(shape if is_scalar(name) else (*shape, 2))
-            for name in names
-            if name != "theta_2"  # every solution has it
-        }
-        solution = solve_some(study, at, None, out)
+        solution = solve_some(study, at)
         code = solution.status_code
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)

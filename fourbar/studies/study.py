@@ -78,8 +78,8 @@ class Study:
 def solve_some(
     study: Study,
     at: Command,
-    stage: str | None,
-    out: Mapping[str, Array] | None,
+    stage: str | None = None,
+    out: Mapping[str, Array] | None = None,
     side: int = 0,
 ) -> Solution:
     """Evaluate every member at some of its positions, `at`, as `Study.solve` does.
@@ -166,14 +166,13 @@ def vary(scene: Scene, values: Mapping[str, Any]) -> Study:
         allowed = f"follows from {pin}, which varies too: vary one of them"
         raise InputError(length, values[length], allowed)
     angles = _read_angles(scene, arrays, theta)
-    members = {key: array.size for key, array in arrays.items() if key != theta}
-    members[theta] = angles.shape[0]
-    sizes = {key: size for key, size in members.items() if size != 1}
-    first, m = next(iter(sizes.items()), ("", 1))
-    for key, size in sizes.items():
-        if size != m:
+    first, m = "", 1
+    for key, array in (arrays | {theta: angles[:, 0]}).items():
+        if m == 1:
+            first, m = key, array.size
+        elif array.size not in (1, m):
             allowed = f"must have one length: {first} has {m}"
-            raise InputError(key, f"{size} members", allowed)
+            raise InputError(key, f"{array.size} members", allowed)
     numbers = {
         key: np.broadcast_to(arrays[key].ravel(), (m,))
         for key in entries

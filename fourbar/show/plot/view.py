@@ -41,20 +41,35 @@ be a long chord.
 """
 
 
-class DrawingPlane(NamedTuple):
-    """Coordinates of a drawing to scale, as complex numbers."""
+class DrawingPlane:
+    """Coordinates of a drawing to scale that hold a sweep, as complex numbers."""
 
-    factor: float
-    """Factor from m to the unit of the drawing."""
-    unit: str
-    origin: complex
-    """Place of O2, in the unit of the drawing as all that follows."""
-    corner: complex
-    """Place to the upper right of what the linkage reaches."""
-    size: float
-    """Size of a support."""
-    barrel: float
-    """Length of what of a cylinder keeps its length; 0 without a cylinder."""
+    def __init__(self, scene: Scene, sweep: Solution, units: Conversion) -> None:
+        bars = scene.linkage
+        O4 = cmath.rect(bars.ground, bars.ground_angle)
+        paths = [sweep.A, sweep.B, sweep.G3, *sweep.points.values()]
+        reached = np.concatenate([*map(join_points, paths), [0.0, O4]])
+        reached = reached[np.isfinite(reached)]
+        largest = float(np.abs(reached).max())
+        self.factor, self.unit = choose_unit(largest, "m", units)
+        """Factor from m to the unit of the drawing, and that unit."""
+        self.origin = self.factor * complex(*scene.origin)
+        """Place of O2, in the unit of the drawing as all that follows."""
+        extent = max(np.ptp(reached.real), np.ptp(reached.imag))
+        self.size = 0.03 * self.factor * float(extent)
+        """Size of a support."""
+        self.barrel = 0.0
+        """Length of what of a cylinder keeps its length; 0 without a cylinder."""
+        if sweep.stroke is not None:
+            self.barrel = 0.85 * self.factor * float(np.nanmin(sweep.stroke))
+        state = compute_shown_state(scene, sweep.at)
+        for load in scene.settled().loads:
+            foot = load.foot(bars.bar(load.bar).to_centre)
+            arm = 0j if load.arm is None else cmath.rect(*load.arm)
+            reached = np.append(reached, state.point(load.bar, foot) + arm)
+        highest = complex(np.nanmax(reached.real), np.nanmax(reached.imag))
+        self.corner = self.origin + self.factor * highest + 2.0 * self.size
+        """Place to the upper right of what the linkage reaches."""
 
     def place(self, points: Any) -> Any:
         """Place points that are given from O2 as complex numbers, m."""
@@ -106,30 +121,9 @@ class View:
         return f"{theta}, t = {place:.4g} s".replace("-", "−")
 
     @property
-    def plane(self) -> DrawingPlane:
+    def plane(self) -> "DrawingPlane":
         """Coordinates that hold all positions of the sweep."""
-        sweep = self.sweep
-        bars = self.scene.linkage
-        O4 = cmath.rect(bars.ground, bars.ground_angle)
-        paths = [sweep.A, sweep.B, sweep.G3, *sweep.points.values()]
-        reached = np.concatenate([*map(join_points, paths), [0.0, O4]])
-        reached = reached[np.isfinite(reached)]
-        factor, unit = choose_unit(float(np.abs(reached).max()), "m", self.units)
-        origin = factor * complex(*self.scene.origin)
-        extent = max(np.ptp(reached.real), np.ptp(reached.imag))
-        barrel = 0.0
-        if sweep.stroke is not None:
-            # the barrel is a little shorter than the shortest stroke of the sweep
-            barrel = 0.85 * factor * float(np.nanmin(sweep.stroke))
-        size = 0.03 * factor * float(extent)
-        state = compute_shown_state(self.scene, sweep.at)
-        for load in self.scene.settled().loads:
-            foot = load.foot(bars.bar(load.bar).to_centre)
-            arm = 0j if load.arm is None else cmath.rect(*load.arm)
-            reached = np.append(reached, state.point(load.bar, foot) + arm)
-        highest = complex(np.nanmax(reached.real), np.nanmax(reached.imag))
-        corner = factor * highest + 2.0 * size
-        return DrawingPlane(factor, unit, origin, origin + corner, size, barrel)
+        return DrawingPlane(self.scene, self.sweep, self.units)
 
     @property
     def goes_round(self) -> bool:
