@@ -30,22 +30,12 @@ _SWAPS = (
 )
 """Names that stand for each other in ordinary speech. Here a pound is a mass.
 """
-_SIGNS = str.maketrans(
-    {
-        "⋅": "·",
-        "×": "·",
-        "•": "·",
-        "″": " in",
-        "”": " in",
-        '"': " in",
-        "′": " ft",
-        "’": " ft",
-        "'": " ft",
-        "º": "°",
-        "˚": "°",
-    }
-)
-"""Other signs of a product, of inches and feet, and signs like that of a degree."""
+_SIGNS = {
+    **str.maketrans("⋅×•º˚", "···°°"),
+    **dict.fromkeys(map(ord, '″”"'), " in"),
+    **dict.fromkeys(map(ord, "′’'"), " ft"),
+}
+"""Other signs of a product and of a degree, and those of inches and feet."""
 _PREFIXED_ANGLE = re.compile(
     r"(?<![A-Za-z])(?!m|µ|u|grad)[A-Za-zµ]{1,2}rad(?![A-Za-z])"
 )

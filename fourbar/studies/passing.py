@@ -84,27 +84,17 @@ def meet_limit(linkage: FourBar, bar: int, angle: float, rounding: float) -> flo
 
     Any other angle stays.
     """
-    for beyond, outwards in _find_nearest_limit(linkage, bar, angle):
-        if 0.0 < beyond <= rounding:
-            return angle - outwards * beyond
-    return angle
-
-
-def _find_nearest_limit(
-    linkage: FourBar, bar: int, angle: float
-) -> list[tuple[float, float]]:
-    """Find the limit of a bar that is nearest to an angle; none of one that turns.
-
-    An entry has how far the angle is beyond the limit, and the sense that leads out of
-    the range there, +1 or -1.
-    """
-    limits = []
+    nearest = math.inf
+    met = angle
     for low, high in find_intervals(linkage, bar):
-        if high - low < TURN:
-            for limit, outwards in ((low, -1.0), (high, 1.0)):
-                beyond = outwards * math.remainder(angle - limit, TURN)
-                limits.append((beyond, outwards))
-    return sorted(limits, key=lambda entry: (abs(entry[0]), entry[0]))[:1]
+        if high - low >= TURN:
+            continue
+        for limit, outwards in ((low, -1.0), (high, 1.0)):
+            away = math.remainder(angle - limit, TURN)
+            if abs(away) < nearest:
+                nearest = abs(away)
+                met = angle - away if 0.0 < outwards * away <= rounding else angle
+    return met
 
 
 def is_same_position(name: str, first: float, second: float) -> bool:

@@ -104,14 +104,9 @@ def _list_extremes(points: Array, missed: float) -> Indices:
     `missed`: part of the path by which the points may miss an extreme.
     """
     direction, lines = _find_direction(points, missed)
-    ends = _list_ends(points @ direction)
-    sides = [np.nanargmin(points, axis=0), np.nanargmax(points, axis=0)]
-    return np.unique([*lines, *ends, *np.ravel(sides)])
-
-
-def _list_ends(heights: Array) -> list[int]:
-    """List the rows of the least and the greatest height."""
-    return [int(np.nanargmin(heights)), int(np.nanargmax(heights))]
+    heights = np.column_stack([points @ direction, points])
+    ends = [np.nanargmin(heights, axis=0), np.nanargmax(heights, axis=0)]
+    return np.unique([*lines, *np.ravel(ends)])
 
 
 def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[int]]:
@@ -200,18 +195,18 @@ def _measure_points(places: Array, points: Array, stated: Mask) -> Path:
     across = np.array([-along[1], along[0]])
     ends = _list_first_ends(points @ along, stated)
     lengths = (points @ along)[ends]
-    heights = points @ across
-    heights = heights[_list_ends(heights)]
-    x_low, y_low = np.nanmin(points, axis=0).tolist()
-    x_high, y_high = np.nanmax(points, axis=0).tolist()
+    sides = points @ across
+    heights = np.array([np.nanmin(sides), np.nanmax(sides)])
+    extents = np.stack([np.nanmin(points, axis=0), np.nanmax(points, axis=0)], axis=1)
+    (x_low, x_high), (y_low, y_high) = extents.tolist()
     low, high = sorted(places[ends].tolist())
     at_ends = np.outer(lengths[[0, 1, 1, 0]], along)
     at_sides = np.outer(heights[[0, 0, 1, 1]], across)
     return Path(
         (x_low, x_high),
         (y_low, y_high),
-        float(heights[1] - heights[0]),
-        float(lengths[1] - lengths[0]),
+        float(np.ptp(heights)),
+        float(np.ptp(lengths)),
         float(np.arctan2(along[1], along[0])),
         (low, high),
         at_ends + at_sides,

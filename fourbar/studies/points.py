@@ -105,8 +105,9 @@ def coupler_curve(
         if of.scene is None:
             raise InputError("of", "a study", "has many linkages; take one scene of it")
         of = of.scene
-    linkage = of.linkage if isinstance(of, Scene) else of
+    linkage = of
     if isinstance(of, Scene):
+        linkage = of.linkage
         if isinstance(r_along, str):
             r_along, r_across = _find_in_coupler(of, r_along)
         first = solve(of, "position", at=command(of).part(slice(0, 1)))
