@@ -26,13 +26,13 @@ import numpy as np
 
 from fourbar.edit.dragging import list_handles
 from fourbar.errors import DependencyError, NotAssembledError, say_install
-from fourbar.linkage import PIN_FORCE
+from fourbar.formulas.mobility import limit_positions
+from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.scene import Scene
 from fourbar.show.animate import collect_live_data
 from fourbar.show.block import SceneBlock
 from fourbar.show.driving import lacks_friction, read_drive_demand
 from fourbar.show.motion_curves import compute_pin_loads, find_drive_rounding
-from fourbar.show.plot.view import list_limits
 from fourbar.show.shown_units import COMMON, write_short
 from fourbar.show.studies import write_type
 from fourbar.show.summary import Facts
@@ -83,9 +83,7 @@ def evaluate_scene(
             "shift": scene.origin,
         }
     data["drawn"] = None if scene.drawing is None else scene.drawing.angle(2)
-    data["turns"] = [
-        (words, *limit[:3]) for words, limits in list_limits(scene) for limit in limits
-    ]
+    data["turns"] = _list_turns(scene)
     data["handles"] = [handle.drawn() for handle in list_handles(scene)]
     shown_units = {**COMMON, **units}
     facts = None
@@ -97,6 +95,17 @@ def evaluate_scene(
             data["peaks"] = list_peaks(solution, facts)
     data["headline"] = write_headline(solution, shown_units, facts)
     return data
+
+
+def _list_turns(scene: Scene) -> list[tuple[Any, ...]]:
+    """List limits of the commanded bar and dead centres: words and the three angles."""
+    turns = []
+    for bar in dict.fromkeys((scene.motion.bar, 2, 4)):
+        word = "limit" if bar == scene.motion.bar else "dead centre"
+        one, other = (number for number in MOVING_BARS if number != bar)
+        words = f"{word}: bars {one}, {other} in line"
+        turns += [(words, *limit[:3]) for limit in limit_positions(scene.linkage, bar)]
+    return turns
 
 
 def write_headline(

@@ -30,7 +30,7 @@ _SWAPS = (
 )
 """Names that stand for each other in ordinary speech. Here a pound is a mass.
 """
-_SIGNS = {
+_SIGNS: dict[int, Any] = {
     **str.maketrans("⋅×•º˚", "···°°"),
     **dict.fromkeys(map(ord, '″”"'), " in"),
     **dict.fromkeys(map(ord, "′’'"), " ft"),

@@ -63,8 +63,8 @@ def follow(scene: Scene, solution: Solution) -> None:
     nearest = order[np.clip(between, 0, len(order) - 1)]
     for name in ("theta_2", *ANGLES):
         if name != solution.at.commanded:
-            angles = getattr(solution, name)
-            turns = np.rint((getattr(course.solution, name)[nearest] - angles) / TURN)
+            angles = solution[name]
+            turns = np.rint((course.solution[name][nearest] - angles) / TURN)
             angles += TURN * np.nan_to_num(turns)
 
 

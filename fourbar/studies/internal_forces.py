@@ -19,10 +19,10 @@ import numpy as np
 from fourbar.effects.effect import Actions, list_bodies
 from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
-from fourbar.formulas.arithmetic import cross, polar
+from fourbar.formulas.arithmetic import cross, polar, vector
 from fourbar.formulas.motion import State
 from fourbar.linkage import ENDS, PIN_FORCE, PINS, require_bar, require_numbers
-from fourbar.quantities import Array, ComplexArray
+from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 
@@ -129,8 +129,8 @@ class _Beam:
             if bar in effect.added_inertia:  # a flywheel turns about the ground pin
                 recorder.couple(bar, -effect.added_inertia[bar] * alpha)
         back = np.conj(recorder.state.direction(bar))
-        pull = (_join(solution.a_A) if bar == 3 else zero) - gravity
-        of_mass = -described.mass * (_join(solution[f"a_G{bar}"]) - gravity)
+        pull = (vector(*solution.a_A.T) if bar == 3 else zero) - gravity
+        of_mass = -described.mass * (vector(*solution[f"a_G{bar}"].T) - gravity)
         of_inertia = -described.moment_of_inertia * alpha
         recorder.record(described.to_centre, of_mass * back, of_inertia)
         supports = _support(recorder, solution)
@@ -204,11 +204,6 @@ def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]
     with np.errstate(all="ignore"):
         q = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
         return q / a, c / q
-
-
-def _join(vectors: Array) -> ComplexArray:
-    """Return vectors, (n, 2), as x + i y, (n,)."""
-    return vectors[:, 0] + 1j * vectors[:, 1]
 
 
 class Acting(NamedTuple):
@@ -295,7 +290,7 @@ def record_acting(
             solution.drive.act(recorder, solution.drive_force)
         elif scene.drive_bar == bar:
             recorder.couple(bar, solution.torque)  # at the bar's first pin
-    pin_forces = {name: getattr(solution, name) for name in PIN_FORCE.values()}
+    pin_forces = {name: solution[name] for name in PIN_FORCE.values()}
     terms: tuple[Any, ...] = case.terms
     for index, term in enumerate(terms):
         if term.key == left_out:
@@ -331,7 +326,7 @@ def _support(recorder: _Recorder, solution: Solution) -> list[Acting]:
     for pin, x, x_other in zip(ENDS[recorder.bar], ends, ends[::-1], strict=True):
         name = PIN_FORCE[pin]
         sign = 1.0 if name[2] == str(recorder.bar) else -1.0
-        along = (sign * _join(getattr(solution, name)) * back).real
+        along = (sign * vector(*solution[name].T) * back).real
         moments = 0.0
         for _, _, place, force, couple in recorder.items:
             moments = moments + cross(place - x_other, force) + couple

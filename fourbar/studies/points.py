@@ -3,7 +3,7 @@
 import numpy as np
 
 from fourbar.errors import InputError, expect
-from fourbar.formulas.arithmetic import Number
+from fourbar.formulas.arithmetic import Number, polar
 from fourbar.formulas.mobility import TURN, circuits, find_circuit
 from fourbar.formulas.path import compute_state, prepare_path
 from fourbar.formulas.points import (
@@ -66,7 +66,7 @@ def instant_centres(
     A, B = (v[..., 0] + 1j * v[..., 1] for v in (solution.A, solution.B))
     linkage = solution.stated.linkage
     angle = linkage.ground_angle
-    O4 = linkage.ground * (np.cos(angle) + 1j * np.sin(angle)) + 0.0 * A
+    O4 = polar(linkage.ground, angle) + 0.0 * A
     along = [vector / np.abs(vector) for vector in (O4, A, B - A, B - O4)]
     return locate_centres(O4, A, B, *along)
 
@@ -105,9 +105,8 @@ def coupler_curve(
         if of.scene is None:
             raise InputError("of", "a study", "has many linkages; take one scene of it")
         of = of.scene
-    linkage = of
+    linkage = of.linkage if isinstance(of, Scene) else of
     if isinstance(of, Scene):
-        linkage = of.linkage
         if isinstance(r_along, str):
             r_along, r_across = _find_in_coupler(of, r_along)
         first = solve(of, "position", at=command(of).part(slice(0, 1)))

@@ -64,14 +64,6 @@ class Sloped(OfParts):
         """Shape of the values."""
         return self.values.shape
 
-    def _is_constant(self, constant: Any) -> Any:
-        """Mark where the value is that of a constant, (n,).
-
-        No slope differs from that of the constant either.
-        """
-        gap = self - constant
-        return (gap.values == 0.0) & (gap.slopes == 0.0).all(axis=0)
-
     def __array__(self, *_: Any, **__: Any) -> Any:
         raise LimitError("a number with slopes cannot become a plain array")
 
@@ -91,13 +83,16 @@ class Sloped(OfParts):
         if method != "__call__" or options:
             raise _refuse(f"{function.__name__} with options")
         if function in (np.equal, np.not_equal):
-            sloped, constant = inputs if isinstance(inputs[0], Sloped) else inputs[::-1]
-            same = sloped._is_constant(constant)
+            # no slope differs either
+            gap = np.subtract(*inputs)
+            same = (gap.values == 0.0) & (gap.slopes == 0.0).all(axis=0)
             return same if function is np.equal else ~same
         if function is np.conjugate:
             return self.conjugate()
-        if function is np.absolute:
-            return self._size()
+        if function is np.absolute:  # of a complex number too
+            size = np.absolute(self.values)
+            along = self.values.conjugate() / size
+            return Sloped(size, (along * self.slopes).real)
         if function is np.frexp:
             mantissa, exponent = np.frexp(self.values)
             return Sloped(mantissa, np.ldexp(self.slopes, -exponent)), exponent
@@ -114,12 +109,6 @@ class Sloped(OfParts):
                 term = number.slopes if unchanged else by * number.slopes
                 slopes = term if slopes is None else slopes + term
         return Sloped(values, slopes)
-
-    def _size(self) -> "Sloped":
-        """Return the absolute value, of a complex number too."""
-        size = np.absolute(self.values)
-        along = self.values.conjugate() / size
-        return Sloped(size, (along * self.slopes).real)
 
     def __array_function__(
         self,
@@ -156,15 +145,11 @@ def take_slopes(number: Any) -> Any:
     return 0.0
 
 
-def _choose_where(mask: Any, x: Any, y: Any) -> Sloped:
-    return Sloped(
+SLOPED_FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    np.where: lambda mask, x, y: Sloped(
         np.where(mask, take_values(x), take_values(y)),
         np.where(mask, take_slopes(x), take_slopes(y)),
-    )
-
-
-SLOPED_FUNCTIONS: dict[Any, Callable[..., Any]] = {
-    np.where: _choose_where,
+    ),
     np.angle: lambda z: np.arctan2(z.imag, z.real),
     np.searchsorted: lambda points, x, side: np.searchsorted(points, x.values, side),
     np.any: lambda x: bool((x != 0.0).any()),

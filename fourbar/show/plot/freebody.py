@@ -52,13 +52,6 @@ class Arrow(NamedTuple):
     dashed: bool = False
 
 
-class Couple(NamedTuple):
-    """A couple on a bar, N m."""
-
-    text: str
-    moment: float
-
-
 def _take_one(vector: Any) -> complex:
     """Return the one complex number of an array, at the position drawn."""
     return complex(np.ravel(vector)[0])
@@ -72,40 +65,41 @@ class FreedBar:
 
     def __init__(self, view: View, bar: int) -> None:
         self.bar = bar
-        self.arrows: list[Arrow] = []
-        self.turns: list[Couple] = []
+        arrows: list[Arrow] = []
         recorder = record_acting(view.scene, view.here, bar)
         described = view.scene.linkage.bar(bar)
-        u = recorder.state.direction(bar)
-        self.G = _take_one(described.to_centre * u)
+        u = _take_one(recorder.state.direction(bar))
+        self.G = described.to_centre * u
         """Mass centre, from the bar's first pin, m."""
         first, second = ENDS[bar]
-        self.pins = {first: 0.0j, second: _take_one(described.length * u)}
+        self.pins = {first: 0.0j, second: described.length * u}
         for pin, arm in self.pins.items():
             of_pin = PIN_FORCE[pin]
-            force = complex(*getattr(view.here, of_pin)[0])
+            force = complex(*view.here[of_pin][0])
             shown = of_pin
             if of_pin[2] != str(bar):
                 force = -force
                 shown = f"F{of_pin[2]}{of_pin[1]}"
             colour = FORCE_COLOURS[of_pin]
-            self.arrows.append(Arrow(write_force_name(shown), arm, force, colour))
+            arrows.append(Arrow(write_force_name(shown), arm, force, colour))
         names = _list_names(view.scene, bar)
+        turns = []
         for acting in recorder.items:
             name = names[acting.term]
-            arm = _take_one(acting.place * u)
-            self.arrows.append(Arrow(name, arm, _take_one(acting.force * u)))
+            arm = _take_one(acting.place) * u
+            arrows.append(Arrow(name, arm, _take_one(acting.force) * u))
             if acting.pin:
                 name += f" at {write_pin_name(acting.pin)}"
-            self.turns.append(Couple(name, _take_one(acting.couple).real))
-        inertial = -described.mass * complex(*getattr(view.here, f"a_G{bar}")[0])
+            turns.append((name, _take_one(acting.couple).real))
+        inertial = -described.mass * complex(*view.here[f"a_G{bar}"][0])
         text = rf"$-m_{bar}\,a_{{G{bar}}}$"
-        self.arrows.append(Arrow(text, self.G, inertial, dashed=True))
-        alpha = float(getattr(view.here, f"alpha_{bar}")[0])
+        arrows.append(Arrow(text, self.G, inertial, dashed=True))
+        alpha = float(view.here[f"alpha_{bar}"][0])
         carried = list_bodies(view.scene.linkage, view.scene.effects)[bar - 2]
-        self.turns.append(Couple(rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
-        self.arrows = [arrow for arrow in self.arrows if arrow.force != 0.0]
-        self.turns = [couple for couple in self.turns if couple.moment != 0.0]
+        turns.append((rf"$-I_{bar}\,\alpha_{bar}$", -carried.I * alpha))
+        self.arrows = [arrow for arrow in arrows if arrow.force != 0.0]
+        self.couples = [(text, moment) for text, moment in turns if moment != 0.0]
+        """Couples on the bar by their texts, N m."""
 
 
 def _list_names(scene: Scene, bar: int) -> list[str]:
@@ -226,9 +220,9 @@ def _draw_one(axes: "Axes", view: View, freed: FreedBar, scale: float) -> None:
         draw_mass_centre(axes, bar, freed.G, freed.G - middle, MUTED)
     axes.set_title(f"Bar {bar} ({BAR_NAMES[bar]})")
     couples = [
-        f"{'↺' if couple.moment > 0.0 else '↻'} {couple.text} ="
-        f" {write_labelled_quantity(abs(couple.moment), 'N m', view.units)}"
-        for couple in freed.turns
+        f"{'↺' if moment > 0.0 else '↻'} {text} ="
+        f" {write_labelled_quantity(abs(moment), 'N m', view.units)}"
+        for text, moment in freed.couples
     ]
     words = "\n".join(couples or ["no couples"])
     axes.set_xlabel(words, loc="left", size=7.5, linespacing=1.45)

@@ -13,9 +13,8 @@ import numpy as np
 
 from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.evaluation.case import compute_shown_state
-from fourbar.formulas.mobility import LimitPosition, find_circuit, limit_positions
+from fourbar.formulas.mobility import find_circuit
 from fourbar.formulas.points import list_circuit
-from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import ANGLES, Array
 from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import BRANCH_NAMES, Sweep
@@ -251,18 +250,6 @@ def where_in_words(solution: Solution) -> str:
     else:
         where = f"{math.degrees(solution.at.angle[0]):.6g} deg"
     return f"{solution.commanded} = {where}"
-
-
-def list_limits(scene: Scene) -> list[tuple[str, tuple[LimitPosition, ...]]]:
-    """List limits of the commanded bar and dead centres: words and positions."""
-    linkage = scene.linkage
-    found = []
-    for bar in dict.fromkeys((scene.motion.bar, 2, 4)):
-        word = "limit" if bar == scene.motion.bar else "dead centre"
-        one, other = (number for number in MOVING_BARS if number != bar)
-        words = f"{word}: bars {one}, {other} in line"
-        found.append((words, limit_positions(linkage, bar)))
-    return found
 
 
 def is_over_time(scene: Scene) -> bool:

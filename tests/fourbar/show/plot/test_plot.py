@@ -351,9 +351,9 @@ def test_free_bodies_balance(drive):
         forces = np.array([arrow.force for arrow in freed.arrows])
         assert abs(forces.sum()) <= BALANCE * abs(forces).max()
         moments = [(arrow.at.conjugate() * arrow.force).imag for arrow in freed.arrows]
-        moments += [couple.moment for couple in freed.turns]
+        moments += [moment for _, moment in freed.couples]
         assert abs(sum(moments)) <= BALANCE * max(map(abs, moments))
-        texts = [couple.text for couple in freed.turns]
+        texts = [text for text, _ in freed.couples]
         assert (f"$T_{bar}$" in texts) == (bar == drive.get("drive_bar"))
         at_pins = ("viscous", "friction", "pin friction", "torsion")
         named = [text for text in texts if text.startswith(at_pins)]
