@@ -24,7 +24,7 @@ from fourbar.studies.keys import (
     read_numbers,
     refuse_key,
 )
-from fourbar.studies.study import Study, solve_some, take_positions, vary
+from fourbar.studies.study import Study, take_positions, vary
 from fourbar.writing import (
     describe_extent,
     list_names,
@@ -187,7 +187,7 @@ def tolerances(
     nominal_closes = slopes.solution.status_code != NOT_ASSEMBLED
     for columns in split(n, max(1, EVALUATED_AT_ONCE // samples)):
         at = take_positions(study.at, slice(None), columns)
-        solution = solve_some(study, at)
+        solution = study.solve(at=at)
         code = solution.status_code
         without[columns] = np.count_nonzero(code, axis=0)
         gone |= ((code == NOT_ASSEMBLED) & nominal_closes[columns]).any(axis=1)

@@ -59,52 +59,43 @@ class Study:
         self,
         stage: str | None = None,
         *,
+        at: Command | None = None,
         out: Mapping[str, Array] | None = None,
         side: int = 0,
     ) -> Solution:
         """Evaluate every member, in shapes (m, n) and (m, n, 2).
 
-        Parameters and errors are those of `fourbar.solve`.
+        Other parameters and errors are those of `fourbar.solve`.
+
+        `at`: some of the positions; effects begin where the whole motion of a member
+        does.
         """
-        return solve_some(self, self.at, stage, out, side)
+        at = self.at if at is None else at
+        results = Results(self.scene, at, stage, out)
+        results.allocate()
+        m, n = results.shape
+        with np.errstate(all="ignore"):
+            for rows in split(m, max(1, results.block // n)):
+                case = self.case(rows, side)
+                if results.asks_forces and self.scene.counts_turns:
+                    case = case.begin_with(take_positions(self.at, rows, slice(None)))
+                for columns in split(n, results.block):
+                    positions = take_positions(at, rows, columns)
+                    results.fill(case, positions, (rows, columns))
+        members = {key: values[:, None] for key, values in self.values.items()}
+        solution = make_solution(replace_numbers(self.scene, members), at, results)
+        # what a scene would refuse, and strokes that a cylinder cannot have
+        results.codes[np.isnan(at.angle)] = NOT_ASSEMBLED
+        results.codes[self.invalid] = INVALID
+        for array in results.arrays.values():
+            array[self.invalid] = np.nan
+        return solution
 
     def case(self, rows: slice, side: int = 0) -> Case:
         """Return the case of some members, whose numbers are (k, 1)."""
         numbers = {key: values[rows, None] for key, values in self.values.items()}
         scene = replace_numbers(self.scene, numbers)
         return Case.of(scene, self.at.bar, side).beside(self.scene)
-
-
-def solve_some(
-    study: Study,
-    at: Command,
-    stage: str | None = None,
-    out: Mapping[str, Array] | None = None,
-    side: int = 0,
-) -> Solution:
-    """Evaluate every member at some of its positions, `at`, as `Study.solve` does.
-
-    Effects begin where the whole motion of a member does.
-    """
-    results = Results(study.scene, at, stage, out)
-    results.allocate()
-    m, n = results.shape
-    with np.errstate(all="ignore"):
-        for rows in split(m, max(1, results.block // n)):
-            case = study.case(rows, side)
-            if results.asks_forces and study.scene.counts_turns:
-                case = case.begin_with(take_positions(study.at, rows, slice(None)))
-            for columns in split(n, results.block):
-                positions = take_positions(at, rows, columns)
-                results.fill(case, positions, (rows, columns))
-    members = {key: values[:, None] for key, values in study.values.items()}
-    solution = make_solution(replace_numbers(study.scene, members), at, results)
-    # what a scene would refuse, and strokes that a cylinder cannot have
-    results.codes[np.isnan(at.angle)] = NOT_ASSEMBLED
-    results.codes[study.invalid] = INVALID
-    for array in results.arrays.values():
-        array[study.invalid] = np.nan
-    return solution
 
 
 def take_positions(at: Command, rows: slice, columns: slice) -> Command:
@@ -238,12 +229,10 @@ def _read_members(key: str, value: Any, keys: list[str]) -> Array:
     if array.dtype.kind not in "iuf" or array.size == 0:
         allowed = "must be an array of numbers, at least one"
         raise InputError(key, value, allowed)
-    may_be, most = "(m,)", 1
-    if key in COMMAND_KEYS:
-        may_be, most = "(n,) or (m, n)", 2
-    if array.ndim > most:
-        allowed = f"must have the shape {may_be}"
-        raise InputError(key, f"shape {array.shape}", allowed)
+    is_commanded = key in COMMAND_KEYS
+    if array.ndim > 1 + is_commanded:
+        shape = "(n,) or (m, n)" if is_commanded else "(m,)"
+        raise InputError(key, f"shape {array.shape}", f"must have the shape {shape}")
     return array.astype(float)
 
 
@@ -254,9 +243,7 @@ def _read_angles(scene: Scene, arrays: Mapping[str, Array], key: str) -> Array:
         if motion.law is not None:
             raise InputError(key, "angles", "are those of the scene's motion law")
         return np.atleast_2d(arrays[key])
-    if motion.law is None and (
-        motion.angle is None or isinstance(motion.angle, FromLimit)
-    ):
+    if motion.law is None and isinstance(motion.angle, FromLimit | None):
         allowed = "depends on the linkage; a study states it: (n,) or (m, n) angles"
         raise InputError(key, motion.angle, allowed)
     return np.atleast_2d(command(scene).stated[0])
