@@ -128,15 +128,16 @@ def write_headline(
         ("largest pin force", "N", PIN_FORCE),
     ):
         sizes = {at: peaks[name] for at, name in names.items() if name in peaks}
-        places = [at for at, size in sizes.items() if size is None]
+        if not sizes:
+            continue
         text = "grows without bound"
-        if sizes and not places:
+        places = [at for at, size in sizes.items() if size is None]
+        if not places:
             size, place = max((size or 0.0, at) for at, size in sizes.items())
-            text = f"{reached}{write_short(size, unit, units)}"
+            text = reached + write_short(size, unit, units)
             places = [place]
         at_pins = ", ".join(filter(None, places))
-        if sizes:
-            parts.append(f"{what} {text}{at_pins and f' at {at_pins}'}{among}")
+        parts.append(f"{what} {text}{at_pins and f' at {at_pins}'}{among}")
     if lacks_friction(solution).any():
         parts.append("dry friction at rest taken as 0")
     if facts is None:

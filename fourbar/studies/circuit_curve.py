@@ -185,9 +185,8 @@ class CircuitCurve:
         swept = self.swept
         if swept is None:
             return np.ones(len(tau), dtype=bool)
-        points = np.stack([swept.theta_2 - self.theta_1, swept.branch], axis=1)
         passes = self._holds(swept.theta_2, swept.branch)
-        places = self.tau(points)
+        places = self.tau(swept.theta_2 - self.theta_1, swept.branch)
         steps = _measure_apart(np.diff(places), 0.0, self.period)
         middles = places[:-1] + 0.5 * steps
         apart = np.abs(_measure_apart(tau[:, None], middles, self.period))
@@ -211,15 +210,14 @@ class CircuitCurve:
             sign = np.where(tau <= math.pi, 1.0, -1.0)
         return np.stack([psi, sign * transmission_angle(self.ratios, psi)], axis=1)
 
-    def tau(self, points: Array) -> Array:
-        """Return the places of points in the row, (n,), rad."""
-        psi = self.low + np.remainder(points[:, 0] - self.low, self.period)
+    def tau(self, psi: Array, sign: Any) -> Array:
+        """Return the places in the row of psi on the branches of some signs, rad."""
+        psi = self.low + np.remainder(psi - self.low, self.period)
         if self.full:
             return np.asarray(psi - self.low)
         away = 0.5 * (self.low + self.high) - psi
         part = np.arccos(np.clip(2.0 * away / (self.high - self.low), -1.0, 1.0))
-        is_open = np.sin(points[:, 1]) >= 0.0
-        return np.asarray(np.where(is_open, part, TURN - part))
+        return np.asarray(np.where(np.greater_equal(sign, 0), part, TURN - part))
 
     def sign(self, psi: Array) -> Array:
         """Return the sign of sin mu in a row without limits, (n,)."""
@@ -234,9 +232,8 @@ class CircuitCurve:
             sines = np.sin(transmission_angle(self.ratios, psi))
             on_circuit = self._holds(self.theta_1 + psi, self.branch)
             psi = psi[on_circuit & (sines > AT_END_OF_SWEEP)]
-            for sign in (1.0, -1.0):
-                ends = np.stack([psi, np.full(psi.shape, sign)], axis=1)
-                places = np.append(places, self.tau(ends))
+            ends = self.tau(psi, 1), self.tau(psi, -1)
+            places = np.concatenate([places, *ends])
         places = np.unique(places)
         return places[self.inside(self.points(places)[:, 0])]
 

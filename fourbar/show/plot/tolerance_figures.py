@@ -117,10 +117,10 @@ def _draw_shares(axes: "Axes", spreads: Tolerances, part: str, over: Array) -> N
         shares = 100.0 * spread.shares / spread.shares.sum(axis=0)
     order = np.argsort(-np.nan_to_num(shares).sum(axis=1))
     names = [spreads.scene.tolerances[i].key for i in order]
-    rows = [shares[i] for i in order[:_MOST_SHARES]]
+    rows = [*shares[order]]
     if len(order) > _MOST_SHARES:
-        rows.append(shares[order[_MOST_SHARES:]].sum(axis=0))
-        names = [*names[:_MOST_SHARES], "the others"]
+        rows[_MOST_SHARES:] = [np.sum(rows[_MOST_SHARES:], axis=0)]
+        names[_MOST_SHARES:] = ["the others"]
     axes.stackplot(over, rows, colors=_SHADES[: len(rows)], labels=names, lw=0.0)
     axes.set(
         ylim=(0.0, 100.0),

@@ -398,7 +398,7 @@ def test_a_sweep_of_another_bar_reaches_both_sides_of_a_limit_and_no_more():
         swept = Motion(theta_4=Sweep(radians(low), radians(high), 977))
         s = solve(replace(scene, motion=swept), "position")
         assert s.assembled.all()
-        places = curve.tau(np.stack([s.theta_2, s.theta_4 - s.theta_3], axis=1))
+        places = curve.tau(s.theta_2, s.sin_mu)
         assert (curve.reached(places) == (low == 150.0)).all()
         assert low != 150.0 or {*np.sign(s.sin_mu)} == {1.0, -1.0}
 
@@ -413,8 +413,8 @@ def test_a_coarse_sweep_reaches_what_it_passes_in_its_circuit_and_no_more():
     psi = np.linspace(*linkage_range, 402)[1:-1]
     passed = (psi < first + 0.5) | (psi > last - 0.5)
     for branch in (1, -1):
-        points = np.stack([psi, np.full(psi.shape, branch)], axis=1)
-        assert_array_equal(curve.reached(curve.tau(points)), passed & (branch == 1))
+        places = curve.tau(psi, branch)
+        assert_array_equal(curve.reached(places), passed & (branch == 1))
 
 
 @mark.parametrize(
