@@ -156,7 +156,7 @@ def drag(
         )
     for handle in list_handles(scene):
         bar_frame = _take_one(state.direction(handle.bar))
-        foot = _take_one(state.foot(handle.bar)) + bar_frame * handle.at
+        foot = _take_one(state.point(handle.bar, handle.at))
         frame = bar_frame if handle.turns else 1.0
         if list(handle.path) == dragged.what:
             pair = (dragged.to - foot) / frame

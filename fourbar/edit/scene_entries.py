@@ -11,7 +11,7 @@ from typing import Any
 
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import AoT, Item, Table, Whitespace
+from tomlkit.items import AoT, Item, Table
 
 from fourbar.effects import Load, PointDrive, list_kinds
 from fourbar.errors import InputError
@@ -125,34 +125,27 @@ def _offer_bars(offers: dict[str, Any]) -> None:
         for name, declared in Bar.numbers.items():
             example = EXAMPLES[declared.unit]
             if declared.pair:
-                # example of a pair of lengths: height and thickness of a cross-section
-                pair = (
-                    [example, "0 deg"]
-                    if declared.pair == "rad"
-                    else [*("20 mm", "5 mm")]
-                )
-                part = {"at": ["bars", bar, name], "value": pair}
-                offers["parts"].append(part)
+                pair = [example, "0 deg"]
+                if declared.pair == "m":  # height and thickness of a cross-section
+                    pair = ["20 mm", "5 mm"]
+                offers["parts"].append({"at": ["bars", bar, name], "value": pair})
             elif declared.left_out is not REQUIRED_NUMBER:
                 fields.setdefault(bar, {})[name] = example
 
 
 def _offer_commands() -> dict[str, Any]:
     """List the names that can be commanded: label, and the fields that apply to it."""
-    open_ = {"branch": "open"}
-    commands = {
-        names: (f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}", open_)
-        for bar, names in COMMAND_NAMES.items()
-    }
-    commands[STROKE_COMMAND] = "stroke of the cylinder", {"side": "left", **open_}
-    return {
-        names[0]: {
-            "label": label,
-            "fields": {name: _MOVING[Motion.numbers[name].unit] for name in names}
-            | words,
-        }
-        for names, (label, words) in commands.items()
-    }
+    offered = {}
+    for bar, names in (*COMMAND_NAMES.items(), (0, STROKE_COMMAND)):
+        label = "stroke of the cylinder"
+        fields = {name: _MOVING[Motion.numbers[name].unit] for name in names}
+        if bar:
+            label = f"angle \u03b8{chr(0x2080 + bar)} of the {BAR_NAMES[bar]}"
+        else:
+            fields["side"] = "left"
+        fields["branch"] = "open"
+        offered[names[0]] = {"label": label, "fields": fields}
+    return offered
 
 
 class SceneDocument:
@@ -201,7 +194,8 @@ class SceneDocument:
         if last == -1:
             new = _write_inline(value)
             if isinstance(holder, AoT):
-                new = _make_toml_table(value, tomlkit.nl())
+                new = _make_toml_table(value)
+                new.add(tomlkit.nl())
             holder.append(new)
             return
         old = self.at(path)
@@ -268,12 +262,10 @@ def _read_plain_number(text: str) -> int | float | str:
     return text
 
 
-def _make_toml_table(entries: dict[str, Any], *after: Whitespace) -> Table:
+def _make_toml_table(entries: dict[str, Any]) -> Table:
     made = tomlkit.table()
     for key, value in entries.items():
         made[key] = _write_inline(value)
-    for blank in after:
-        made.add(blank)
     return made
 
 
