@@ -221,10 +221,10 @@ class Session:
         if len(text.encode()) > LARGEST_SCENE_FILE:
             allowed = f"must not exceed {LARGEST_SCENE_FILE} bytes"
             raise InputError("scene file", len(text), allowed)
-        plain = parse_tables(text, str(self.path))
+        path = str(self.path)
+        plain = parse_tables(text, path)
         with state_messages_in(units_of_scene(plain)):
-            scene = read_tables(plain, str(self.path))
-            path = str(self.path)
+            scene = read_tables(plain, path)
             require_steps(scene.motion, MOST_SOLVED_ANEW, "in the workbench", path)
         return SceneState(text, scene, plain)
 

@@ -130,11 +130,11 @@ class MotionCourse:
         motion = self.scene.motion
         if self.released is not None and motion.free is not None:
             stated = self.released.at.places
-        else:
-            stated = command(self.scene).places
-        if states_single_positions(motion):
+        elif states_single_positions(motion):
             first = float(command(self.scene).angle[0])
             stated = default_places(self.scene, first)
+        else:
+            stated = command(self.scene).places
         steps = len(stated) - 1
         # least number of intervals of a motion
         parts = -(-2000 // max(steps, 1))

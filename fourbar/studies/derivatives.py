@@ -223,7 +223,7 @@ class Sensitivity:
         """
         if entry.unit == "rad":
             return _DEGREE
-        if entry.is_coordinate:
+        if entry.is_drawn_place or "drawing" in entry.place:
             return _HUNDREDTH * max(self.scene.linkage.lengths)
         return _HUNDREDTH * abs(number)
 

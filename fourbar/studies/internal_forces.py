@@ -188,7 +188,12 @@ class _Beam:
             single = self.at(feet)[1] / self.density + spread  # forces at feet only
             inside = np.clip(feet, 0.0, self.length)
             after = np.append(inside[:, 1:], inside[:, -1:], axis=1)
-            for root in _solve_stable_quadratic(bend, across, -single):
+            # where V = 0, without cancellation; NaN where it is nowhere
+            with np.errstate(all="ignore"):
+                root = np.sqrt(across * across + 4.0 * bend * single)
+                q = -0.5 * (across + np.copysign(root, across))
+                roots = q / bend, -single / q
+            for root in roots:
                 places.append(np.clip(np.nan_to_num(root), inside, after))
                 moments.append(self.at(places[-1])[2])
         x = np.concatenate(places, axis=1)
@@ -197,13 +202,6 @@ class _Beam:
         worst = np.arange(len(M)), np.argmax(np.abs(M), axis=1)
         moment = np.where(np.isfinite(M[worst]), M[worst], np.nan)
         return Bending(moment, np.where(np.isfinite(moment), x[worst], np.nan))
-
-
-def _solve_stable_quadratic(a: Array, b: Array, c: Array) -> tuple[Array, Array]:
-    """Solve a x^2 + b x + c = 0 without cancellation; NaN where no root is real."""
-    with np.errstate(all="ignore"):
-        q = -0.5 * (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
-        return q / a, c / q
 
 
 class Acting(NamedTuple):

@@ -66,11 +66,6 @@ class SceneNumber(NamedTuple):
         """True for a coordinate, in the drawing, of a place of a bar."""
         return DRAWN_WORD in self.place
 
-    @property
-    def is_coordinate(self) -> bool:
-        """True for a coordinate in the drawing, of a pin or of a place of a bar."""
-        return self.is_drawn_place or self.place[:1] == ("drawing",)
-
     def holds(self, values: Any) -> Any:
         """Mark the numbers that a scene would accept."""
         return np.isfinite(values) & is_within(values, self.bound)

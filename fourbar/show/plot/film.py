@@ -155,10 +155,9 @@ def choose_frames(shown: View, count: int) -> list[int]:
     segment = np.flatnonzero(assembled & (gaps_before == gaps_before[here]))
     first, last = segment[[0, -1]]
 
-    over_time = shown.time is not None
     covered = positions.angle[last] - positions.angle[first]
-    is_one_turn = abs(covered - math.tau) < 1e-6 and not over_time
-    there_and_back = not (over_time or is_one_turn)
+    is_one_turn = abs(covered - math.tau) < 1e-6 and shown.time is None
+    there_and_back = shown.time is None and not is_one_turn
     if there_and_back:
         count = max(2, count // 2)
     places = np.linspace(first, last, count, endpoint=not is_one_turn)

@@ -284,12 +284,10 @@ def set_degree_ticks(axis: Any, most: int = 8) -> None:
 
 
 def place_legend(axes: "Axes", columns: int = 4) -> None:
-    """Place the legend, if a curve has a value, between title and panel.
+    """Place the legend between title and panel.
 
     No curve is covered there; a drawing to scale has a narrower legend.
     """
-    if not axes.get_legend_handles_labels()[1]:
-        return
     to_scale = axes.get_aspect() == 1.0
     above, pad, line = (1.005, 6.0, 12.0) if to_scale else (1.02, 7.0, 11.0)
     legend = axes.legend(loc="lower left", bbox_to_anchor=(0.0, above), ncols=columns)

@@ -357,8 +357,8 @@ def draw_vectors(axes: "Axes", view: View, solution: Solution, index: int) -> No
     Velocities have one scale for the sweep, and so have accelerations.
     """
     plane = view.plane
+    names = list_point_names(view.scene)
     for letter, (colour, label) in _ARROWS.items():
-        names = list_point_names(view.scene)
         sizes = [np.hypot(*derive(view.sweep, f"{letter}_{name}").T) for name in names]
         top = choose_limit(sizes) or largest_magnitude(*sizes)
         for name in names:
