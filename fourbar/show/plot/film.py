@@ -198,11 +198,11 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any
         drawn = (*axes.lines, *axes.patches, *axes.texts)
         moved.extend(artist for artist in drawn if artist not in still)
         place = write_cell(axis.factor * sweep.at.places[index], ".2f")
-        words = f"{axis.symbol} = {place}{axis.unit}".replace("-", "−")
+        words = f"{axis.symbol} = {place}{axis.unit}"
         if shown.time is not None:
             theta_2 = math.degrees(sweep.theta_2[index])
-            words += f", θ₂ = {write_cell(theta_2, '.1f')}°".replace("-", "−")
-        title.set_text(f"{words}, {shown.branch_name} branch")
+            words += f", θ₂ = {write_cell(theta_2, '.1f')}°"
+        title.set_text(f"{words}, {shown.branch_name} branch".replace("-", "−"))
         return sorted([*moved, title], key=lambda artist: artist.get_zorder())
 
     closes = np.flatnonzero(sweep.assembled)

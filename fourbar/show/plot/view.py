@@ -265,11 +265,12 @@ def list_sweep(scene: Scene) -> tuple[Command, float | None]:
     """
     stated = command(scene)
     if len(stated.angle) > 1:
-        places = np.sort(stated.places, kind="stable")
+        order = np.argsort(stated.places, kind="stable")
+        low, high = stated.places[order[[0, -1]]]
         drawn = find_drawn_place(scene)
-        if drawn is not None and places[0] < drawn < places[-1]:
-            return command_at(scene, np.unique([*places, drawn])), drawn
-        return stated.part(np.argsort(stated.places, kind="stable")), drawn
+        if drawn is not None and low < drawn < high:
+            return command_at(scene, np.union1d(stated.places, drawn)), drawn
+        return stated.part(order), drawn
     wide = command_at(scene, default_places(scene, float(stated.angle[0])))
     place = stated.places
     if not stated.moves_stroke:
