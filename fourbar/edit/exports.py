@@ -269,8 +269,7 @@ class HarnessRun:
                 start_new_session=True,  # so that it ends with all that it starts
             )
             printed, _ = await self.process.communicate()
-            status = self.process.returncode
-            assert status is not None
+            status = await self.process.wait()
             # lines of what the harness prints
             lines = printed.decode(errors="replace").splitlines()[:30]
             about |= {"lines": lines, "stopped": status < 0, "status": status}

@@ -248,10 +248,8 @@ def _compute_first_order(slopes_of: Sensitivity, part: str) -> Spread:
     nominal, of_all = slopes_of.find(part)
     keys = list(slopes_of.keys)
     slopes = of_all[[keys.index(tolerance.key) for tolerance in toleranced]]
-    deviations, reaches = (
-        np.array([getattr(tolerance, width) for tolerance in toleranced])[:, None]
-        for width in ("deviation", "reach")
-    )
+    deviations = np.array([[tolerance.deviation] for tolerance in toleranced])
+    reaches = np.array([[tolerance.reach] for tolerance in toleranced])
     shares = (slopes * deviations) ** 2
     worst = np.asarray(np.abs(slopes * reaches).sum(axis=0))
     deviation, low, high, least, greatest = np.full((5, *nominal.shape), np.nan)
