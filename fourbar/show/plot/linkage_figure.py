@@ -22,6 +22,7 @@ from fourbar.show.plot.style import (
     join_points,
     place_legend,
     plot_points,
+    split_complex,
     split_points,
     write_labelled_quantity,
     write_pin_name,
@@ -156,13 +157,14 @@ def draw_support(axes: "Axes", pin: complex, size: float) -> None:
     from matplotlib.patches import Polygon, Rectangle
 
     wide = 1.7 * size
-    left, right, foot = pin.real - wide, pin.real + wide, pin.imag - wide
-    corners = split_points([pin, pin - size - 1j * wide, pin + size - 1j * wide])
+    foot = pin - 1j * wide
+    corners = split_points([pin, foot - size, foot + size])
     axes.add_patch(Polygon(corners, fc="white", ec=INK, lw=1.0, zorder=3))
-    place = (left, foot - 0.8 * size)
-    hatched: Any = {"fc": "none", "ec": INK, "lw": 0.0, "hatch": "//////", "zorder": 2}
-    axes.add_patch(Rectangle(place, 2.0 * wide, 0.8 * size, **hatched))
-    axes.plot([left, right], [foot, foot], color=INK, lw=1.0, zorder=3)
+    place = split_complex(foot - wide - 0.8j * size)
+    ground = Rectangle(place, 2.0 * wide, 0.8 * size, fc="none", ec=INK, lw=0.0)
+    ground.set(hatch="//////", zorder=2)
+    axes.add_patch(ground)
+    plot_points(axes, [foot - wide, foot + wide], color=INK, lw=1.0, zorder=3)
 
 
 def _write_bar_name(view: View, bar: int) -> str:
