@@ -19,7 +19,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
 )
 from fourbar_validation.engines.mujoco.robots.loop_scene import read_loop_scene
 from fourbar_validation.engines.mujoco.robots.measure import (
-    examine_file,
     examine_mended,
     measure_loops,
 )
@@ -293,7 +292,7 @@ def examine_text(scene, text=None, **names):
     Without a text it is the file generated from the scene.
     """
     file = None if text is None else file_of(text)
-    return examine_file(scene, file, replace(AS_DRAWN, names=names))
+    return measure_loops(file, replace(AS_DRAWN, names=names), scene)
 
 
 def mend(scene, file, names, changes):
@@ -310,12 +309,13 @@ def judge_path(name, scene, path):
 
 def notes_of(examined):
     """Return the notes on a file and on what was found in it."""
-    return [*examined.notes, *examined.measured.remarks]
+    (loop,) = examined.loops
+    return [*examined.notes, *loop.parts, *loop.remarks]
 
 
 def answers_of(examined):
     """Return the answers of a file that was examined."""
-    return list_answers(examined.measured)
+    return list_answers(examined.loops[0])
 
 
 def answer_of(examined, how):

@@ -47,7 +47,6 @@ from fourbar_validation.robots.differences import (
     order,
     price,
 )
-from fourbar_validation.robots.judge_loop import _EXAMINE as EXAMINE
 from fourbar_validation.robots.judge_loop import (
     FILE_AT_ONE_STATE,
     FILE_THROUGH_TIME,
@@ -55,6 +54,7 @@ from fourbar_validation.robots.judge_loop import (
     answer_changed,
     judge_file,
 )
+from fourbar_validation.robots.loop_errors import MEASURE
 from fourbar_validation.robots.report import _describe_differences
 from tests.support.robots import (
     AS_DRAWN,
@@ -112,13 +112,16 @@ def generated(scene):
 
 
 def values(examined):
-    return {key: entry.value for key, entry in examined.described.items()}
+    return {key: entry.value for key, entry in examined.loops[0].described.items()}
 
 
 def differences(scene, theirs):
     """Return the differences of an examined file from the generated one, by key."""
     return {
-        d.key: d for d in find_differences(generated(scene).described, theirs.described)
+        d.key: d
+        for d in find_differences(
+            generated(scene).loops[0].described, theirs.loops[0].described
+        )
     }
 
 
@@ -175,7 +178,7 @@ def test_a_file_that_is_right_agrees_and_what_differs_is_named(name):
         assert worst_error(CRANK_ROCKER, examination, how) <= SIMULATED.factor
     taken_off = "servo" in text
     assert any("servo" in note for note in notes_of(examination)) == taken_off
-    assert examination.measured.switched_off == ("O2-O4",) * taken_off
+    assert examination.loops[0].switched_off == ("O2-O4",) * taken_off
 
 
 def test_what_is_welded_to_a_bar_is_part_of_it():
@@ -389,7 +392,7 @@ def test_bodies_are_guessed_from_what_hangs_together_and_from_the_lengths():
     text = text.replace(rocker[0], "").replace("<worldbody>", "<worldbody>" + rocker[0])
     examination = examine_text(FEW, text)
     bars = "Bars: ground world, input crank, coupler rod, output rocker."
-    assert bars in examination.notes
+    assert bars in examination.loops[0].parts
     assert errors(FEW, examination)["theta_4"] < STIFF_ENOUGH
 
 
@@ -438,7 +441,7 @@ def test_the_one_thing_that_is_wrong_costs_its_error(group, entry):
     spoilt = examine_text(scene, text, **names)
     one = differences(scene, spoilt)[key]
     rows = rows_of(scene, answers_of(spoilt))
-    at = spoilt.measured.command(spoilt.measured.states)
+    at = spoilt.loops[0].command(spoilt.loops[0].states)
     answer = answer_changed(scene, one, at)
     if answer is not None:
         priced = price(one, rows_of(scene, [answer]), ())
@@ -587,7 +590,7 @@ def test_a_loop_that_nothing_closes_is_seen_in_the_numbers():
     assert values(examination)["closure.by"] == "nothing"
     assert np.isnan(errors(FEW, examination)["F43"])
     assert errors(FEW, examination)["torque"] > 0.01
-    assert examination.measured.refusal == "nothing closes the loop"
+    assert examination.loops[0].refusal == "nothing closes the loop"
 
 
 @pytest.mark.parametrize("timestep", ["1e-12", "1e9"])
@@ -626,7 +629,7 @@ def test_a_file_that_overdoes_it_is_one_line_with_its_name():
             text = re.sub(old, new, GENERATED)
             assert text != GENERATED
             with raises(InputError) as caught:
-                examined(EXAMINE, CRANK_ROCKER, file_of(text))
+                examined(MEASURE, file_of(text), AS_DRAWN, CRANK_ROCKER)
             message = str(caught.value)
             assert message.startswith("robot.xml: MJCF = 'robot.xml': "), what
             assert words in message and "\n" not in message, what

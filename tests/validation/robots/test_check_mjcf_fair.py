@@ -25,7 +25,7 @@ from fourbar_validation.compare.tolerance import SIMULATED, wrap_difference
 from fourbar_validation.engines.mujoco import couple as couples
 from fourbar_validation.engines.mujoco.robots import inside
 from fourbar_validation.engines.mujoco.robots.measure import (
-    examine_file,
+    measure_loops,
     predict_softness,
 )
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
@@ -103,7 +103,7 @@ def error_of(scene, examined, how, name):
 def list_keys(scene, examined, *parts):
     """List what differs from the generated file in some parts of the description."""
     generated = examine_text(scene)
-    listed = find_differences(generated.described, examined.described)
+    listed = find_differences(generated.loops[0].described, examined.loops[0].described)
     return [one.key for one in listed if one.key.startswith(parts)]
 
 
@@ -189,7 +189,7 @@ def test_a_file_that_differs_in_nothing_is_told_that_its_timestep_is_the_limit()
 
 def test_no_softness_lets_a_file_be_wrong_by_more_than_a_tenth():
     soft = dict.fromkeys(FORCE_NAMES, 1e9)
-    rows = list_rows("dry", examined_dry().measured, SIMULATED, soft)
+    rows = list_rows("dry", examined_dry().loops[0], SIMULATED, soft)
     allowed = [row.allowed for row in rows if row.quantity == "F43"]
     assert max(allowed) == approx(0.1, rel=1e-3)
 
@@ -246,7 +246,7 @@ def test_a_stop_that_the_motion_does_not_meet_is_no_difference():
         limited("O4", low + math.tau, high + math.tau),
     ):
         examined = examine_text(BARE, text)
-        assert examined.described["pins.O4.range"].value == "free"
+        assert examined.loops[0].described["pins.O4.range"].value == "free"
         assert any("the stops of joint 'O4'" in note for note in notes_of(examined))
         assert error_of(BARE, examined, FILE_AT_ONE_STATE, "torque") < 1e-4
 
@@ -257,7 +257,7 @@ def test_a_stop_inside_the_motion_is_where_the_bars_meet_it():
     examined = examine_text(
         BARE, counted_from_elsewhere(limited("O4", middle, 3.0), "O4")
     )
-    stops = examined.described["pins.O4.range"].value
+    stops = examined.loops[0].described["pins.O4.range"].value
     assert stops == approx((middle, 3.0))
     answer = answer_of(examined, FILE_AT_ONE_STATE)
     ours = solve(BARE, "force", at=answer.at)
@@ -271,9 +271,9 @@ def measure_rocker(scene, drawn, theta_4, branch):
     """Measure the file of a drawn linkage at angles of its output."""
     motion = Motion(theta_4=theta_4, omega_4=1.0, branch=branch)
     loop = examine_text(replace(scene, motion=motion), write_mjcf(drawn, drive="none"))
-    assert find_left_out(loop.measured) < ROUND_OFF
-    assert not loop.measured.states.open
-    return " ".join(loop.measured.remarks)
+    assert find_left_out(loop.loops[0]) < ROUND_OFF
+    assert not loop.loops[0].states.open
+    return " ".join(loop.loops[0].remarks)
 
 
 @pytest.mark.parametrize("branch, behind", [("open", False), ("crossed", True)])
@@ -482,7 +482,7 @@ def test_a_loop_closed_at_the_input_of_the_scene_is_judged(drive_bar):
     ]
     other = min(ways, key=lambda way: np.ptp(solve(way).theta_4 - there.theta_2))
     assert find_loop_of_scene(file, other, AS_DRAWN).loop.cut == "O2"
-    loop = examine_file(other, file, AS_DRAWN).measured
+    loop = measure_loops(file, AS_DRAWN, other).loops[0]
     assert loop.joint == "theta_2"
     assert find_left_out(loop) < ROUND_OFF
     through = loop.through_time
@@ -501,7 +501,7 @@ def test_what_the_stiffest_constraint_leaves_of_the_motion_is_predicted_too():
     angles = np.linspace(*command(scene).theta_2[[0, -1]], 19)
     scene = recommand(scene, angle=angles, speed=10.0)
     left = predict_softness(scene, file, AS_DRAWN)
-    answer = answer_of(examine_file(scene, file, AS_DRAWN), FILE_THROUGH_TIME)
+    answer = answer_of(measure_loops(file, AS_DRAWN, scene), FILE_THROUGH_TIME)
     ours = solve(scene, "velocity", at=answer.at)
     for name in ("theta_3", "theta_4", "omega_3", "omega_4"):
         away = answer.quantities[name] - np.asarray(getattr(ours, name))

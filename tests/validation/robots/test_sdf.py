@@ -669,9 +669,9 @@ def test_a_step_beyond_the_end_of_a_motion_meets_no_stop(tmp_path):
     crank = f"<child>crank</child>{AXIS}"
     file = read(tmp_path, changed(crank, crank.replace("</axis>", stops)))
     examined = examine_text(read_scene(file, speed=1.0).scene, file)
-    end = examined.measured.through_time.rows.joint.max()
+    end = examined.loops[0].through_time.rows.joint.max()
     assert end > 1.0
-    assert examined.described["pins.O2.range"].value == UNLIMITED_RANGE
+    assert examined.loops[0].described["pins.O2.range"].value == UNLIMITED_RANGE
 
 
 @pytest.mark.slow

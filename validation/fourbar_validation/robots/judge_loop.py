@@ -52,6 +52,7 @@ from fourbar_validation.robots.differences import (
     price,
 )
 from fourbar_validation.robots.guard import examine_guarded
+from fourbar_validation.robots.loop_errors import MEASURE
 from fourbar_validation.robots.unread import list_unread
 
 FILE_AT_ONE_STATE = "mjcf-one-state"
@@ -62,7 +63,6 @@ JUDGED_QUANTITIES = tuple(
 """Quantities that a file is held to. A soft loop lets the bars accelerate by themselves
 for an instant; what that does to the torque and the pin forces is judged there.
 """
-_EXAMINE = "fourbar_validation.engines.mujoco.robots.measure:examine_file"
 _MENDED = "fourbar_validation.engines.mujoco.robots.measure:examine_mended"
 _SOFTNESS = "fourbar_validation.engines.mujoco.robots.measure:predict_softness"
 _NOTHING = 1e-9
@@ -154,27 +154,27 @@ def judge_file(
     held = replace(options, error=None)
     scene = options.state_speed(scene)
     with examine_guarded(file) as examined:
-        theirs = examined(_EXAMINE, scene, file, held)
+        theirs = examined(MEASURE, file, held, scene)
+        (measured,) = theirs.loops
+        at = measured.command(measured.states)
         plain = MeasureOptions(PoseOptions())
         if options.span is not None:
-            angles = theirs.measured.command(theirs.measured.states).angle.tolist()
-            plain = replace(plain, span=(min(angles), max(angles)))
-        generated = examined(_EXAMINE, scene, None, plain)
+            plain = replace(plain, span=(at.angle.min(), at.angle.max()))
+        (generated,) = examined(MEASURE, None, plain, scene).loops
         ours = {
             (row.engine, row.quantity): row.error
-            for row in list_rows(name, generated.measured, SIMULATED)
+            for row in list_rows(name, generated, SIMULATED)
         }
-        rows = list_rows(name, theirs.measured, tolerance)
+        rows = list_rows(name, measured, tolerance)
         if options.error is None and any(row.failed for row in rows):
             softness = examined(_SOFTNESS, scene, file, held)
-            rows = list_rows(name, theirs.measured, tolerance, softness)
-        differences = find_differences(generated.described, theirs.described)
+            rows = list_rows(name, measured, tolerance, softness)
+        differences = find_differences(generated.described, measured.described)
         if any(row.failed for row in rows):
-            at = theirs.measured.command(theirs.measured.states)
-            judge = partial(judge_answers, name, theirs.measured, tolerance=tolerance)
+            judge = partial(judge_answers, name, measured, tolerance=tolerance)
             mend = partial(examined, _MENDED, scene, file, held)
             differences = [*_price(differences, rows, scene, at, judge, mend)]
-    notes = [*theirs.notes]
+    notes = [*theirs.notes, *measured.parts]
     if file.kind != "URDF" and (parts := list_unread(file.text)):
         notes.append(f"not looked at: {', '.join(parts)}")
     if file.kind != "MJCF":
@@ -183,7 +183,7 @@ def judge_file(
             for one in differences
         ]
         notes.append(SETTINGS_OF_AN_SDF)
-    return LoopJudgement(theirs.measured, order(differences), rows, ours, notes)
+    return LoopJudgement(measured, order(differences), rows, ours, notes)
 
 
 def _price(

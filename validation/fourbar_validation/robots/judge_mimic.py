@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 
 from fourbar.errors import InputError
 from fourbar.linkage import record, require
@@ -36,20 +37,21 @@ FEWEST_POSITIONS = 6
 """Least positions of the scene from which a polynomial of degree 4 is fitted by least
 squares with an error to tell.
 """
-FIT_HEADINGS = ("degree", "fit", "angle, deg", "ratio")
-_FITS = ("least squares", "smallest largest error")
-"""Names of the fits of `_MimicReport.squares` and `_MimicReport.fitted`."""
+SQUARES = "least squares"
+"""Name of the fits to the scene's positions."""
+MINIMAX = "smallest largest error"
+"""Name of the fits whose largest error of the angle is least."""
 ROW = "{:6}  {:22}  {:>10}  {:>8}"
-"""Format of a row under FIT_HEADINGS; its polycoef stands on a line below it."""
+"""Format of a row of the table of fits; its polycoef stands on a line below it."""
 
 
 @record
 class _MimicError:
     """Largest errors of a polynomial over the motion."""
 
-    coefficients: tuple[float, ...]
-    """a0 to a4 over the leader counted from its zero; over theta_2 where no zero of
-    the follower is known.
+    polynomial: Polynomial
+    """Over the leader counted from its zero; over theta_2 where no zero of the follower
+    is known.
     """
     angle: float
     """rad."""
@@ -64,9 +66,9 @@ class _MimicReport:
     equality: JointEquality
     swing: tuple[float, float]
     """First and last theta_2 of the motion, rad."""
-    file: _MimicError
-    """Angle counted from the zeros of the file. Errors that depend on an unknown zero
-    are NaN.
+    ratio: float
+    """Largest error of the follower's speed over omega_2; NaN if it depends on an
+    unknown zero.
     """
     zeros: tuple[tuple[float, float], ...]
     """Largest error counted from an angle of the follower's bar at the leader's zero,
@@ -79,10 +81,8 @@ class _MimicReport:
     """
     centred: float
     """Largest error of the angle with the constant that makes it smallest, rad."""
-    squares: tuple[_MimicError, ...]
-    """Polynomials of POLYNOMIAL_DEGREES by least squares over the scene's positions."""
-    fitted: tuple[_MimicError, ...]
-    """Polynomials of POLYNOMIAL_DEGREES whose largest error of the angle is least."""
+    fits: Mapping[str, list[_MimicError]]
+    """Polynomials of POLYNOMIAL_DEGREES by SQUARES and by MINIMAX."""
 
 
 def measure_mimic(
@@ -142,13 +142,13 @@ def measure_mimic(
     # both joints in their own senses
     side = equality.side * equality.sense
     turned = side * angle
-    own = _measure_polynomial(equality.coefficients, x, turned, equality.sense * ratio)
-    left = np.polynomial.polynomial.polyval(x, equality.coefficients) - turned
-    if math.isnan(equality.theta_2) and any(equality.coefficients[2:]):
-        own = replace(own, ratio=math.nan)
-        left = np.full_like(left, math.nan)
+    own = Polynomial(equality.coefficients)
+    left = own(x) - turned
+    ratio_left = own.deriv()(x) - equality.sense * ratio
+    if math.isnan(equality.theta_2) and any(own.coef[2:]):
+        ratio_left = left = np.full_like(left, math.nan)
     errors = sorted(
-        (float(np.abs(_drop_turns(left + side * zero)).max()), zero)
+        (_find_largest(_drop_turns(left + side * zero)), zero)
         for zero in zeros
         if not math.isnan(zero)
     )
@@ -161,23 +161,29 @@ def measure_mimic(
     else:
         x = theta_2
     at_positions = np.searchsorted(theta_2, positions)
-    squares = []
-    fitted = []
+
+    def measure(fitted: Polynomial) -> _MimicError:
+        largest = _find_largest(fitted(x) - y)
+        return _MimicError(fitted, largest, _find_largest(fitted.deriv()(x) - ratio))
+
+    fits: dict[str, list[_MimicError]] = {SQUARES: [], MINIMAX: []}
     for degree in POLYNOMIAL_DEGREES:
-        least_squares = fit_squares(x[at_positions], y[at_positions], degree)
-        minimax = fit_minimax(x, y, degree)
-        squares.append(_measure_polynomial(least_squares, x, y, ratio))
-        fitted.append(_measure_polynomial(minimax, x, y, ratio))
+        squares = Polynomial.fit(x[at_positions], y[at_positions], degree).convert()
+        fits[SQUARES].append(measure(squares))
+        fits[MINIMAX].append(measure(fit_minimax(x, y, degree)))
     return _MimicReport(
         equality,
         (low, high),
-        replace(own, angle=errors[0][0] if errors else math.nan),
+        _find_largest(ratio_left),
         tuple(errors),
-        shifted=float(np.abs(left - left[at_positions].mean()).max()),
+        shifted=_find_largest(left - left[at_positions].mean()),
         centred=float(np.ptp(left)) / 2.0,
-        squares=tuple(squares),
-        fitted=tuple(fitted),
+        fits=fits,
     )
+
+
+def _find_largest(errors: Array) -> float:
+    return float(np.abs(errors).max())
 
 
 def _place_leader(scene: Scene, equality: JointEquality) -> Array:
@@ -254,39 +260,7 @@ def _follow(
     return np.unwrap(turn), ratio
 
 
-def _measure_polynomial(
-    coefficients: tuple[float, ...],
-    x: Array,
-    turned: Array,
-    ratio: Array,
-) -> _MimicError:
-    """Measure the largest errors of a polynomial."""
-    polynomial = np.polynomial.Polynomial(coefficients)
-    angle = float(np.abs(polynomial(x) - turned).max())
-    speed = float(np.abs(polynomial.deriv()(x) - ratio).max())
-    return _MimicError(tuple(coefficients), angle, speed)
-
-
-def fit_squares(
-    x: Array,
-    y: Array,
-    degree: int,
-) -> tuple[float, ...]:
-    """Fit a polynomial by least squares."""
-    return _list_powers(np.polynomial.Polynomial.fit(x, y, degree).convert())
-
-
-def _list_powers(polynomial: np.polynomial.Polynomial) -> tuple[float, ...]:
-    """Return the coefficients of polycoef, (5,), lowest power first."""
-    missing = max(POLYNOMIAL_DEGREES) + 1 - len(polynomial.coef)
-    return tuple(np.pad(polynomial.coef, (0, missing)).tolist())
-
-
-def fit_minimax(
-    x: Array,
-    y: Array,
-    degree: int,
-) -> tuple[float, ...]:
+def fit_minimax(x: Array, y: Array, degree: int) -> Polynomial:
     """Fit a polynomial with the smallest largest error.
 
     minimize t subject to |p(x_i) - y_i| <= t, a linear program in the coefficients of
@@ -294,18 +268,18 @@ def fit_minimax(
     """
     from scipy.optimize import linprog
 
-    fitted = np.polynomial.Chebyshev.fit(x, y, degree)
+    fitted = Chebyshev.fit(x, y, degree)
     left = y - fitted(x)
     size = float(np.abs(left).max()) or 1.0
-    scaled = np.polynomial.polyutils.mapdomain(x, fitted.domain, fitted.window)
-    basis = np.polynomial.chebyshev.chebvander(scaled, degree)
+    powers = range(degree + 1)
+    basis = np.array([Chebyshev.basis(k, fitted.domain)(x) for k in powers]).T
     ones = np.ones((len(x), 1))
     above = np.block([[basis, -ones], [-basis, -ones]])
     limits = np.concatenate([left, -left]) / size
     cost = np.eye(degree + 2)[-1]
     best = linprog(cost, A_ub=above, b_ub=limits, bounds=(None, None))
-    fitted += np.polynomial.Chebyshev(size * best.x[:-1], fitted.domain)
-    return _list_powers(fitted.convert(kind=np.polynomial.Polynomial))
+    fitted += Chebyshev(size * best.x[:-1], fitted.domain)
+    return fitted.convert(kind=Polynomial)
 
 
 def show_mimic(report: _MimicReport) -> None:
@@ -315,7 +289,8 @@ def show_mimic(report: _MimicReport) -> None:
     print_sentence(
         f"{equality.follower} ({angle}) follows"
         f" {equality.leader} by polycoef"
-        f" {_write_coefficients(equality.coefficients)}; {_write_theta_2(report)}"
+        f" {_write_coefficients(Polynomial(equality.coefficients))};"
+        f" {_write_theta_2(report)}"
     )
     if equality.remark:
         print_sentence(equality.remark)
@@ -340,13 +315,13 @@ def show_mimic(report: _MimicReport) -> None:
             f"the polynomials below need no zero: {angle} = a0 + a1 theta_2 + a2"
             " theta_2^2 + ..., in rad"
         )
-    click.echo(ROW.format(*FIT_HEADINGS))
-    fits = zip(POLYNOMIAL_DEGREES, report.squares, report.fitted, strict=True)
-    for degree, *errors in fits:
-        for fit, error in zip(_FITS, errors, strict=True):
+    click.echo(ROW.format("degree", "fit", "angle, deg", "ratio"))
+    for row, degree in enumerate(POLYNOMIAL_DEGREES):
+        for fit, errors in report.fits.items():
+            error = errors[row]
             sizes = (_deg(error.angle), _write(error.ratio, 4))
             click.echo(ROW.format(str(degree), fit, *sizes))
-            polycoef = _write_coefficients(error.coefficients)
+            polycoef = _write_coefficients(error.polynomial)
             click.echo(f"{'':8}{label} {polycoef}")
 
 
@@ -388,10 +363,10 @@ def _write_errors(report: _MimicReport) -> str:
     through_zero = ""
     missing = ""
     if report.zeros:
-        _, zero = report.zeros[0]
+        largest, zero = report.zeros[0]
         in_file = is_same_angle(zero, equality.follower_zero)
         through_zero = (
-            f"{_deg(report.file.angle)} deg through the zero of the file, where {angle}"
+            f"{_deg(largest)} deg through the zero of the file, where {angle}"
             f"{'' if in_file else ' of the loop'} is"
             f" {_deg(math.remainder(zero, math.tau))} deg; "
         )
@@ -405,7 +380,7 @@ def _write_errors(report: _MimicReport) -> str:
         f"{_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
         f"of the ratio {_write_ratio(equality)}: "
-        f"{_write(report.file.ratio, 4)}{missing}"
+        f"{_write(report.ratio, 4)}{missing}"
     )
 
 
@@ -413,8 +388,10 @@ def _deg(angle: float) -> str:
     return _write(math.degrees(angle), 5)
 
 
-def _write_coefficients(coefficients: tuple[float, ...]) -> str:
-    return " ".join(_write(number, 7) for number in coefficients)
+def _write_coefficients(polynomial: Polynomial) -> str:
+    """Write a0 to a4."""
+    missing = max(POLYNOMIAL_DEGREES) + 1 - len(polynomial.coef)
+    return " ".join(_write(a, 7) for a in np.pad(polynomial.coef, (0, missing)))
 
 
 def _write(number: float, digits: int) -> str:

@@ -31,7 +31,7 @@ from fourbar_validation.robots.files import read_robot
 from fourbar_validation.robots.guard import examine_guarded
 from fourbar_validation.robots.options import read_number, read_pose
 
-_MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
+MEASURE = "fourbar_validation.engines.mujoco.robots.measure:measure_loops"
 MEASURE_SECONDS = 600.0
 """s; a busy machine takes several times the two minutes of an idle one."""
 RIGID = "rigid pins"
@@ -112,7 +112,7 @@ def measure_robot(
     """Measure the loops of a robot's file in a guarded process."""
     file = read_robot(path, assets)
     with examine_guarded(file, MEASURE_SECONDS) as examined:
-        measurement: RobotMeasurement = examined(_MEASURE, file, options, scene)
+        measurement: RobotMeasurement = examined(MEASURE, file, options, scene)
     return measurement
 
 

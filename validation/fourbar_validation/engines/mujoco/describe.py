@@ -97,7 +97,7 @@ class _Description:
     def __init__(self, seen: SeenLoop, flywheel: float) -> None:
         self.seen = seen
         self.model = model = seen.model
-        self.pins = {joint: pin for pin, joint in seen.hinge.items()}
+        self.pins = seen.pins
         self.described: Described = {}
         skew = seen.loop.misaligned
         self.put("plane", seen.plane)
@@ -243,7 +243,7 @@ class _Description:
             element = self.name("actuator", i)
             bar = None
             if kind == mujoco.mjtTrn.mjTRN_SITE:
-                bar = seen.bar(model.site_bodyid[number])
+                bar = seen.loop.bars[model.site_bodyid[number]]
             if kind == mujoco.mjtTrn.mjTRN_JOINT:
                 if number in self.pins and seen.is_alone:
                     pin = self.pins[number]
@@ -283,7 +283,7 @@ class _Description:
         axes = seen.data.site_xmat[axes_of].reshape(3, 3)
         gear = model.actuator_gear[actuator].reshape(2, 3)
         force, couple = (axes @ one * size for one in gear)
-        bearer = seen.bar(model.site_bodyid[axes_of])
+        bearer = seen.loop.bars[model.site_bodyid[axes_of]]
         directions = "world axes"
         if bearer in MOVING_BARS:
             fx, fy = seen.resolve(bearer, force)
@@ -301,7 +301,7 @@ class _Description:
             if kind == mujoco.mjtWrap.mjWRAP_JOINT:
                 parts.append(self.pins.get(index, "another joint"))
             elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-                bar = self.seen.bar(self.model.site_bodyid[index])
+                bar = self.seen.loop.bars[self.model.site_bodyid[index]]
                 parts.append("no bar" if bar is None else BAR_NAMES[bar])
             else:
                 parts.append(kind.name.removeprefix("mjWRAP_").lower())
@@ -326,7 +326,7 @@ class _Description:
                     before = rest.get(i, -float(model.tendon_length0[i]))
                     rest[i] = before + coefficient * seen.rest_angle(pin)
                 elif kind == mujoco.mjtWrap.mjWRAP_SITE:
-                    bar = seen.bar(model.site_bodyid[index])
+                    bar = seen.loop.bars[model.site_bodyid[index]]
                     place = bar and seen.along_bar(bar, seen.data.site_xpos[index])
                     path.append((str(bar), *(place or ())))
             numbers = tuple(number for _, *place in sorted(path) for number in place)

@@ -13,7 +13,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.engines.description import name_driving
-from fourbar_validation.engines.mujoco.robots.measure import examine_file
+from fourbar_validation.engines.mujoco.robots.measure import measure_loops
 from fourbar_validation.engines.mujoco.robots.onto_scene import find_loop_of_scene
 from fourbar_validation.places import MODELS
 from fourbar_validation.robots.loop_errors import find_left_out, list_errors_by_method
@@ -160,7 +160,7 @@ def test_a_loop_closed_at_any_pin_is_moved_by_any_bar(cut, bar, away):
     "name, refusal", slow_but([*COMMANDS.items()][:2], COMMANDS.items())
 )
 def test_every_command_is_judged_at_single_states(name, refusal):
-    loop = examine_file(load(MODELS / f"{name}.toml"), None).measured
+    loop = measure_loops(None, AS_DRAWN, load(MODELS / f"{name}.toml")).loops[0]
     assert find_left_out(loop) < 1e-8
     for error in list_errors_by_method(loop):
         assert error.part < SOFT, error

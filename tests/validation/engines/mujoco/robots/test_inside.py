@@ -14,6 +14,7 @@ import pytest
 from pytest import approx
 from scipy.optimize import bisect
 
+import fourbar
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
@@ -277,7 +278,11 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
 ):
     """The open one is the parallelogram, and the other its mirror image."""
     posed, loop = pose_loop(draw_knee(drawn))
-    inside = LoopInside(posed.model, loop, bar=bar, branch=branch)
+    rates = {f"theta_{bar}": 0.0, f"omega_{bar}": 1.0}
+    motion = fourbar.Motion(branch=branch, **rates)
+    linkage = fourbar.uniform(*loop.lengths)
+    scene = fourbar.Scene(linkage, motion, drive_bar=bar)
+    inside = LoopInside(posed.model, loop, scene)
     angle = loop.angles[bar - 1] + math.radians(turned)
     state = inside.state(angle, 1.0)
     crank, _, knee = np.exp(1j * (state.qpos + math.radians(drawn))) * 0.03

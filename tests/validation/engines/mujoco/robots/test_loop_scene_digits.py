@@ -210,7 +210,7 @@ def test_a_turn_is_measured_but_where_the_digits_do_not_tell_the_pose(text):
 def test_the_digits_of_a_file_are_no_error_of_its_motion(text):
     """Over the full turn of its own scene, at single states."""
     scene = read_scene(text, speed=1.0).scene
-    measured = examine_text(scene, text).measured
+    measured = examine_text(scene, text).loops[0]
     for rounding, verdict in ((measured.rounding, DEGRADED), (0.0, FAILS)):
         known = replace(measured, rounding=rounding)
         rows = list_rows("foot", known, SIMULATED, {"torque": 0.0})

@@ -64,7 +64,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     find_joint,
     pose_robot,
 )
-from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, list_bars
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 
 _PIN_BETWEEN = {frozenset(bars): pin for pin, bars in PINS.items()}
 """Pins by the two bars that each joins."""
@@ -655,7 +655,10 @@ class _Finder:
         hinges = {pin: joint for pin, joint in at_pins if joint is not None}
         cut = next((pin for pin in PINS if pin not in hinges), None)
         bodies = dict(zip(ENDS, groups, strict=True))
-        bars = {root: bar for bar, group in bodies.items() for root in group}
+        held = {*range(self.model.njnt)} - {*hinges.values()}
+        roots = find_roots(self.model, held)
+        of_root = {roots[body]: bar for bar in bodies for body in bodies[bar]}
+        bars = tuple(map(of_root.get, roots))
         normal = find_mean_axis(data, hinges.values())
         turns_ground = bars[self.join(driven)[0]] == 1
         if (data.xaxis[driven] @ normal > 0.0) == turns_ground:
@@ -671,21 +674,20 @@ class _Finder:
             closures=(chain.number,),
             cut=cut,
             bodies=bodies,
+            bars=bars,
             ground=chain.ground_name,
             hinges=hinges,
             senses=senses,
-            cut_bars=tuple(bars[self.root[end]] for end in chain.ends),
+            cut_bars=tuple(bars[end] for end in chain.ends),
             axes=np.eye(3),
             misaligned=chain.skew,
             qpos=data.qpos.copy(),
-            held=tuple(sorted({*range(self.model.njnt)} - {*hinges.values()})),
+            held=tuple(sorted(held)),
         )
         loop = replace(loop, axes=self._choose_axes(loop, normal))
-        loop = replace(
-            loop,
-            lines=tuple(map(LoopFrame(loop, data).line, ENDS)),
-            stated_lines=tuple(map(LoopFrame(loop, self.before).line, ENDS)),
-        )
+        before = LoopFrame(loop, self.before).place()["angles"]
+        placed = LoopFrame(loop, data).place()
+        loop = replace(loop, stated_angles=before, **placed)
         for length, (one, other) in zip(loop.lengths, ENDS.values(), strict=True):
             if length <= COINCIDENT_PINS * max(loop.lengths):
                 raise _NoFourBarError(
@@ -763,8 +765,7 @@ class _Finder:
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Return the equalities of the closing pin, and others on moving bars."""
         model = self.model
-        bars = {root: bar for bar, roots in loop.bodies.items() for root in roots}
-        on_bar = list_bars(model, loop)
+        rigid = {*sum(loop.bodies.values(), ())}
         frame = LoopFrame(loop, self.data)
         nearest = max(COINCIDENT_PINS * max(loop.lengths), LARGEST_RESIDUAL)
         closures = [loop.equality]
@@ -777,10 +778,10 @@ class _Finder:
                 others.append(number)
                 continue
             chain = self.chains[number]
-            numbers = frozenset(on_bar[end] or 1 for end in chain.ends)
+            numbers = frozenset(loop.bars[end] or 1 for end in chain.ends)
             if len(numbers) == 1:
                 continue
-            if not all(self.root[end] in bars for end in chain.ends):
+            if not all(self.root[end] in rigid for end in chain.ends):
                 others.append(number)
                 continue
             pin = _PIN_BETWEEN.get(numbers, "")

@@ -1,7 +1,6 @@
 """The drive of a scene, as what it exerts on the bodies of a loop."""
 
 import cmath
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,24 +14,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 
-
-class Cylinder(NamedTuple):
-    """Actuator of a file along a tendon between two sites."""
-
-    actuator: int
-    sites: list[int]
-
-
-def find_cylinder(model: mujoco.MjModel) -> Cylinder | None:
-    """Return the cylinder of a file if it has exactly one."""
-    on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
-    controlled = model.actuator_gainprm.any(axis=1)
-    cylinders = np.flatnonzero(on_tendons & controlled).tolist()
-    if len(cylinders) != 1:
-        return None
-    wraps = [*list_wraps(model, model.actuator_trnid[cylinders[0], 0])]
-    sites = [index for kind, index, _ in wraps if kind == mujoco.mjtWrap.mjWRAP_SITE]
-    return Cylinder(cylinders[0], sites) if len(sites) == len(wraps) == 2 else None
+_SITE = mujoco.mjtWrap.mjWRAP_SITE
 
 
 class LoopDrive:
@@ -42,15 +24,26 @@ class LoopDrive:
     in the place of that of the scene.
     """
 
-    def __init__(self, model: mujoco.MjModel, loop: RobotLoop, scene: Scene) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, loop: RobotLoop, scene: Scene | None
+    ) -> None:
+        """Take the drive of a scene; None: a couple on bar 2."""
         self.model = model
         self.loop = loop
-        self.drive = scene.settled_drive()
-        self.couple_bar = None if scene.drive is not None else scene.drive_bar
-        """Bar on which a couple acts, if that is the drive."""
-        self.cylinder = None
-        if isinstance(scene.drive, LinearDrive):
-            self.cylinder = find_cylinder(model)
+        self.force = None if scene is None else scene.settled_drive()
+        """None: the drive is a couple."""
+        self.couple_bar = 2 if scene is None else scene.drive_bar
+        self.cylinders: list[int] = []
+        """Actuator of the file between two sites that drives, if it has exactly one."""
+        if isinstance(self.force, LinearDrive):
+            on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+            controlled = model.actuator_gainprm.any(axis=1)
+            self.cylinders = np.flatnonzero(on_tendons & controlled).tolist()
+        tendons = model.actuator_trnid[self.cylinders, 0].tolist()
+        wraps = [wrap for tendon in tendons for wrap in list_wraps(model, tendon)]
+        self.sites = [site for kind, site, _ in wraps if kind == _SITE]
+        if len(tendons) != 1 or not len(self.sites) == len(wraps) == 2:
+            self.cylinders = []
 
     def _find_loads(self, data: mujoco.MjData) -> Array:
         """Return force and couple on each body, world axes, (nbody, 6), per N m or N.
@@ -60,7 +53,7 @@ class LoopDrive:
         frame = LoopFrame(self.loop, data)
         loads = np.zeros((self.model.nbody, 6))
         ground, *_ = self.loop.bodies[1]
-        if self.couple_bar is not None:
+        if self.force is None:
             loads[self.loop.bodies[self.couple_bar][0], 3:] = frame.normal
             loads[ground, 3:] = -frame.normal
             return loads
@@ -72,22 +65,21 @@ class LoopDrive:
             arm = frame.to_world(line / abs(line) * complex(place.in_bar))
             return self.loop.bodies[place.bar][0], pin + arm
 
-        if isinstance(self.drive, PointDrive):
-            second, end = locate(self.drive.place)
+        if isinstance(self.force, PointDrive):
+            second, end = locate(self.force.place)
             first = ground
             start = end
-            direction = self.drive.direction
-            if self.drive.frame == "bar":
-                direction += frame.angle(self.drive.place.bar)
+            direction = self.force.direction
+            if self.force.frame == "bar":
+                direction += frame.angle(self.force.place.bar)
             line = frame.to_world(cmath.rect(1.0, direction))
-        elif self.cylinder is not None:
-            start, end = data.site_xpos[self.cylinder.sites]
-            first, second = self.model.site_bodyid[self.cylinder.sites].tolist()
+        elif self.cylinders:
+            start, end = data.site_xpos[self.sites]
+            first, second = self.model.site_bodyid[self.sites].tolist()
             line = end - start
         else:
-            assert isinstance(self.drive, LinearDrive)
-            first, start = locate(self.drive.start)
-            second, end = locate(self.drive.end)
+            first, start = locate(self.force.start)
+            second, end = locate(self.force.end)
             line = frame.in_plane(end - start) @ frame.axes
         force = line / np.linalg.norm(line)
         for body, point, one in ((first, start, -force), (second, end, force)):

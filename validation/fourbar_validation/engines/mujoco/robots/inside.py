@@ -32,9 +32,9 @@ import mujoco
 import numpy as np
 
 from fourbar.errors import LimitError
-from fourbar.linkage import MOVING_BARS, PINS, Bar, FourBar
+from fourbar.linkage import ENDS, MOVING_BARS, PINS, Bar, FourBar
 from fourbar.quantities import Array, Signs
-from fourbar.scene import find_signs
+from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.free_body_closure import close
@@ -61,12 +61,12 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     varies,
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
-    BearerForces,
     copy_for_closures,
     evaluate_closures,
+    find_bearer_forces,
     read_equality_force,
 )
-from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, list_bars
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 from fourbar_validation.engines.mujoco.runner import Stepper
 
 CLOSED = 1e-15
@@ -150,27 +150,25 @@ class LoopInside:
         self,
         model: mujoco.MjModel,
         loop: RobotLoop,
-        drive: LoopDrive | None = None,
+        scene: Scene | None = None,
         *,
-        bar: int = 2,
-        branch: int = OPEN,
         as_it_is: bool = False,
     ) -> None:
         """Take a loop.
 
         Parameters
         ----------
-        drive : what moves it; None: a couple on the commanded bar.
-        bar : the commanded bar, 2, 3 or 4.
-        branch : the assembly, where the bars that follow are in line in the pose.
+        scene : tells the commanded bar, what drives it, and the assembly where the bars
+            that follow are in line in the pose; None: a couple on bar 2, and the open
+            one.
         as_it_is : contacts, joint limits and other motors act as in the file.
         """
         self.loop = loop
         self.given = model
-        self.bar = bar
-        self.branch = branch
+        self.scene = scene
         self.as_it_is = as_it_is
-        self.acting = None if drive is None or drive.couple_bar == bar else drive
+        self.bar = bar = 2 if scene is None else command(scene).bar
+        self.drive = LoopDrive(model, loop, scene)
         self.model = copy(model)
         self.joint = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         """Hinge between the ground and the commanded bar, if the file has one."""
@@ -198,14 +196,13 @@ class LoopInside:
         first, second = (loop.angles[one - 1] for one in FOLLOWING[bar])
         self.signs = np.array([1 if math.sin(second - first) > 0.0 else -1], np.int8)
         """Sign of the sine of the angle between the bars that follow in the pose."""
-        self.assembly: Signs | int = branch
+        self.assembly: Signs | int = OPEN if scene is None else scene.motion.branch
         if not is_in_line(loop.angles, bar):
             at_pose = np.array([loop.angles[bar - 1]])
             self.assembly = find_signs(self.linkage, at_pose, self.signs, bar)
         self._theta = np.array(loop.angles)
         """theta_1 to theta_4 at the last pose, with their whole turns, rad."""
-        self.bearers = BearerForces(self.model)
-        self._bars = list_bars(model, loop)
+
         self.flywheel = 0.0
         """Part of the armature of the driven hinge that keeps its speed, kg m^2. Its
         torque is none of the drive's.
@@ -217,8 +214,7 @@ class LoopInside:
 
     def with_model(self, model: mujoco.MjModel) -> "LoopInside":
         """Return the same loop in a changed model, with nothing but it acting."""
-        loop = self.loop
-        return LoopInside(model, loop, self.acting, bar=self.bar, branch=self.branch)
+        return LoopInside(model, self.loop, self.scene)
 
     def _switch_off(self) -> None:
         """Switch off what acts on the loop beside its drive."""
@@ -230,8 +226,7 @@ class LoopInside:
         else:
             model.opt.disableflags |= LIMITS_OFF | find_bits("contact")
             off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
-        if self.acting is not None and self.acting.cylinder is not None:
-            off = [*off, self.acting.cylinder.actuator]
+        off = [*off, *self.drive.cylinders]
         model.actuator_gainprm[off] = 0.0
         model.actuator_biasprm[off] = 0.0
         # while joints are held, what ties them to the moving bars would only be torn
@@ -243,9 +238,8 @@ class LoopInside:
         turns = np.zeros((3, self.model.nv))
         body = self.loop.bodies[self.bar][0]
         mujoco.mj_jacBody(self.closure, self.closing, None, turns, body)
-        normal = LoopFrame(self.loop, self.closing).normal
         # axes are parallel but for what a file misaligns: each turns by one, or not
-        turn[self.moving] = np.rint(normal @ turns)[self.moving]
+        turn[self.moving] = np.rint(self.frame.normal @ turns)[self.moving]
         return turn
 
     def find_flywheel(self, inertia: float) -> None:
@@ -351,14 +345,6 @@ class LoopInside:
             qpos[address] = drawn + math.remainder(qpos[address] - drawn, math.tau)
         return qpos if self.close_gap(qpos) else None
 
-    def _find_rates(self, qpos: Array) -> Array:
-        """Return the turn of the hinges that follow by that of the commanded bar, (k,).
-
-        The loop is closed in a pose.
-        """
-        _, jacobian = self._evaluate_closure(qpos)
-        return _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
-
     def close_gap(self, qpos: Array) -> bool:
         """Move the hinges that follow until the closure's residual is least.
 
@@ -386,8 +372,7 @@ class LoopInside:
     def measure_sine(self, qpos: Array) -> float:
         """Return the sine of the angle between the bars that follow in a pose."""
         self._evaluate_closure(qpos)
-        frame = LoopFrame(self.loop, self.closing)
-        first, second = map(frame.line, FOLLOWING[self.bar])
+        first, second = map(self.frame.line, FOLLOWING[self.bar])
         product = first.conjugate() * second
         return product.imag / abs(product)
 
@@ -407,8 +392,8 @@ class LoopInside:
         data = self.closing
         data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self.closure, data)
-        normal = LoopFrame(self.loop, data).normal
-        normals = dict.fromkeys(self.loop.closures, normal)
+        self.frame = LoopFrame(self.loop, data)
+        normals = dict.fromkeys(self.loop.closures, self.frame.normal)
         return evaluate_closures(self.closure, data, normals)
 
     def state(self, angle: float, speed: float) -> _RobotState | None:
@@ -419,8 +404,9 @@ class LoopInside:
         qpos = self.close(angle)
         if qpos is None:
             return None
-        rates = self.step + self.basis @ self._find_rates(qpos)
-        return _RobotState(qpos, speed * rates)
+        _, jacobian = self._evaluate_closure(qpos)
+        turns = _solve_least_squares(jacobian @ self.basis, -jacobian @ self.step)
+        return _RobotState(qpos, speed * (self.step + self.basis @ turns))
 
     def ask(self, qpos: Array, qvel: Array, wanted: float) -> Any:
         """Evaluate a state in which the commanded bar accelerates as wanted, rad/s^2.
@@ -460,22 +446,18 @@ class LoopInside:
         carried = self.flywheel * wanted
 
         def accelerate(size: float) -> float:
-            if self.acting is None:
-                data.qfrc_applied[:] = holding + self.turn * (carried + size)
-            else:
-                data.qfrc_applied[:] = holding + self.turn * carried
-                self.acting.exert(data, size)
+            data.qfrc_applied[:] = holding + self.turn * carried
+            self.drive.exert(data, size)
             mujoco.mj_forward(model, data)
             return float(self.turn @ data.qacc)
 
         size = find_couple(model, data, accelerate, wanted)
         if size is None:
             raise LimitError(f"its drive does not move {self.name} in this robot")
-        mujoco.mj_rnePostConstraint(model, data)
         self.contacts = max(self.contacts, int(data.ncon))
         limits = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT
         self.stopped.update(data.efc_id[: data.nefc][limits].tolist())
-        forces = self._read_forces(data)
+        forces = self._read_forces(model, data)
         if math.isnan(size):
             forces *= np.nan
         row = (
@@ -503,13 +485,10 @@ class LoopInside:
     def _read_bars(self, data: mujoco.MjData) -> tuple[float, ...]:
         """Return angles and speeds of the moving bars in an evaluated state."""
         self._evaluate_closure(data.qpos)
-        frame = LoopFrame(self.loop, self.closing)
-        ground = data.cvel[self.loop.bodies[1][0]]
-        speeds = [
-            float((data.cvel[self.loop.bodies[bar][0]] - ground)[:3] @ frame.normal)
-            for bar in MOVING_BARS
-        ]
-        return (*map(frame.angle, MOVING_BARS), *speeds)
+        bodies = [self.loop.bodies[bar][0] for bar in ENDS]
+        ground, *speeds = data.cvel[bodies, :3] @ self.frame.normal
+        turning = (float(speed - ground) for speed in speeds)
+        return (*map(self.frame.angle, MOVING_BARS), *turning)
 
     def _measure_gap(self, qpos: Array) -> float:
         """Measure the distance of the ends of the closure in the plane, m."""
@@ -519,9 +498,7 @@ class LoopInside:
     @property
     def lever(self) -> float:
         """Factor of pin forces that makes them of the drive's kind, m or 1."""
-        if self.acting is not None and self.acting.drive is not None:
-            return 1.0
-        return self.loop.longest
+        return self.loop.longest if self.drive.force is None else 1.0
 
     @property
     def name(self) -> str:
@@ -557,7 +534,7 @@ class LoopInside:
         limits = data.efc_frictionloss[data.ne : data.nefc]
         needed += rubbing.T @ (limits * np.sign(rubbing @ state.qvel))
         needed -= self.turn * self.flywheel * wanted
-        pull = self.turn if self.acting is None else self.acting.find_pull(data)
+        pull = self.drive.find_pull(data)
         # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
         # is across the pull
         level = pull[self.moving] / np.linalg.norm(pull[self.moving])
@@ -568,12 +545,9 @@ class LoopInside:
         size = float(left @ level / np.linalg.norm(pull[self.moving]))
         data.qacc[:] = accelerations
         data.efc_force[: data.ne] = multipliers
-        if self.acting is not None:
-            self.acting.exert(data, size)
-        mujoco.mj_rnePostConstraint(model, data)
-        forces = self._read_forces(data)
-        if self.acting is not None:
-            self.acting.exert(data, 0.0)
+        self.drive.exert(data, size)
+        forces = self._read_forces(model, data)
+        self.drive.exert(data, 0.0)
         return (size, *forces), accelerations
 
     def _balance(self, accelerations: Array) -> Array:
@@ -605,32 +579,26 @@ class LoopInside:
         start = np.zeros(len(self.moving) - 1)
         return find_forces(root(leave, start, jac=differ, tol=_BALANCED).x)
 
-    def _read_forces(self, data: mujoco.MjData) -> Array:
+    def _read_forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         """Return the pin forces of an evaluated state, (4, 2), N.
 
         Their order is that of PIN_FORCES.
         """
-        frame = LoopFrame(self.loop, data)
-        forces = []
-        for pin, name in FORCE_AT.items():
-            _, acted_on = FORCE_BETWEEN[name]
-            if pin in self.loop.hinges:
-                body = self.model.jnt_bodyid[self.loop.hinges[pin]]
-                parts = [(body, self.bearers.read(data, body))]
+        loop = self.loop
+        bearing = find_bearer_forces(model, data)
+        forces = np.zeros((len(FORCE_AT), 3))
+        for row, (pin, name) in enumerate(FORCE_AT.items()):
+            if pin in loop.hinges:
+                body = model.jnt_bodyid[loop.hinges[pin]]
+                parts = [(body, bearing[body])]
             else:
-                parts = [
-                    (
-                        find_tied_bodies(self.model, one)[0],
-                        read_equality_force(data, one),
-                    )
-                    for one in self.loop.closures
-                ]
-            signed = [
-                force if self._bars[body] == acted_on else -force
-                for body, force in parts
-            ]
-            forces.append(frame.in_plane(np.sum(signed, axis=0)))
-        return np.array(forces)
+                bodies = [find_tied_bodies(model, one)[0] for one in loop.closures]
+                pulls = [read_equality_force(data, one) for one in loop.closures]
+                parts = [*zip(bodies, pulls, strict=True)]
+            _, acted_on = FORCE_BETWEEN[name]
+            for body, part in parts:
+                forces[row] += part if loop.bars[body] == acted_on else -part
+        return forces @ LoopFrame(loop, data).axes.T
 
     def answer_states(self, motion: Array) -> InsideAnswer:
         """Answer at closed states, each by itself.
@@ -680,9 +648,8 @@ class LoopInside:
 
         def drive(row: Any) -> None:
             """Exert a couple on the bar with the power of a row's drive."""
-            couple = row.soft.torque if math.isfinite(row.soft.torque) else 0.0
-            if couple and self.acting is not None:
-                couple *= self.acting.find_speed(data) / row.speed
+            power = row.soft.torque * self.drive.find_speed(data)
+            couple = power / row.speed if math.isfinite(power) else 0.0
             data.qfrc_applied[:] = self.turn * (armature * alpha + couple)
 
         mujoco.mj_forward(self.model, data)
@@ -787,14 +754,13 @@ class LoopInside:
                 data.qfrc_applied[:] = self.turn * torque
                 mujoco.mj_step(model, data)
                 mujoco.mj_forward(model, data)
-                mujoco.mj_rnePostConstraint(model, data)
                 if _has_warned(data):
                     joint = self._read_position(qpos)
                     yield TornState(joint, math.inf, np.empty((0, 2)))
                     return
                 joint = self._read_position(data.qpos)
                 gap = self._measure_gap(data.qpos)
-                yield TornState(joint, gap, self._read_forces(data))
+                yield TornState(joint, gap, self._read_forces(model, data))
 
         starts = (self.close(angle) for angle in angles)
         return [

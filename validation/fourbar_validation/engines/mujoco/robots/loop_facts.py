@@ -3,7 +3,6 @@
 Everything here is plain data, without MuJoCo.
 """
 
-import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,12 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, record
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
 from fourbar_validation.compare.tolerance import WELL_CONDITIONED
-from fourbar_validation.engines.description import list_unknowns
+from fourbar_validation.engines.description import ModelEntry, list_unknowns
 
 BAR_ROLES = {BAR_NAMES[bar]: bar for bar in MOVING_BARS}
 """Number of each moving bar, by its name."""
@@ -118,6 +118,10 @@ class RobotLoop:
     """Bodies of each bar, 1 to 4: one, or the two that a weld joins. Each is the body
     of the file that the others of the bar are fixed to.
     """
+    bars: tuple[int | None, ...]
+    """Bar, 1 to 4, that each body of the model belongs to, (nbody,); None: it belongs
+    to none. What hangs on a bar by joints that are held belongs to it.
+    """
     ground: str
     """Name of the body that carries both branches of the loop: part of bar 1."""
     hinges: Mapping[str, int]
@@ -138,10 +142,12 @@ class RobotLoop:
     """Joint positions of the whole model in the pose, (nq,)."""
     held: tuple[int, ...]
     """Joints of the model that are no pin of this loop and stay where they are."""
-    lines: tuple[complex, ...] = ()
-    """Lines of bars 1 to 4 in the plane, from their first pin to the second, m."""
-    stated_lines: tuple[complex, ...] = ()
-    """The same before the loops were closed, m."""
+    lengths: tuple[float, ...] = ()
+    """Lengths of ground, input, coupler and output, m."""
+    angles: tuple[float, ...] = ()
+    """theta_1 to theta_4 in the pose from the x of `axes`, with whole turns, rad."""
+    stated_angles: tuple[float, ...] = ()
+    """Directions of the bars before the loops were closed, rad."""
     other_equalities: tuple[int, ...] = ()
     """Active equalities that act on its moving bars and are no closure of it."""
     chosen: tuple[str, ...] = ()
@@ -152,8 +158,6 @@ class RobotLoop:
     from its own where the digits of the file cannot tell the linkage from one with a
     change point.
     """
-    turned: float = 0.0
-    """Angle of the axes of its scene in the plane, with whole turns, rad."""
     from_other_end: "RobotLoop | None" = None
     """The loop with its output for its input, in the same plane."""
 
@@ -161,16 +165,6 @@ class RobotLoop:
     def joint(self) -> int:
         """Joint that is driven; pin O2 of a loop as its file has it is a hinge."""
         return self.hinges["O2"]
-
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """Lengths of ground, input, coupler and output, m."""
-        return tuple(map(abs, self.lines))
-
-    @property
-    def angles(self) -> tuple[float, ...]:
-        """theta_1 to theta_4 in the pose, in the axes of its scene, rad."""
-        return tuple(cmath.phase(line) - self.turned for line in self.lines)
 
     @property
     def met(self) -> tuple[float, ...]:
@@ -196,7 +190,7 @@ class RobotLoop:
 
         The pose then does not tell the assembly.
         """
-        return is_in_line(tuple(map(cmath.phase, self.stated_lines)), bar)
+        return is_in_line(self.stated_angles, bar)
 
     def seen_from_behind(self) -> "RobotLoop":
         """Return the loop with the other normal of its plane.
@@ -206,10 +200,14 @@ class RobotLoop:
         return replace(
             self,
             axes=self.axes * [[1.0], [-1.0], [-1.0]],
-            lines=tuple(line.conjugate() for line in self.lines),
-            stated_lines=tuple(line.conjugate() for line in self.stated_lines),
+            angles=tuple(-angle for angle in self.angles),
             senses={pin: -sense for pin, sense in self.senses.items()},
         )
+
+    def turn(self, angle: float) -> "RobotLoop":
+        """Return the loop in axes that are turned by an angle in its plane, rad."""
+        axes = Rotation.from_rotvec([0.0, 0.0, -angle]).as_matrix() @ self.axes
+        return replace(self, axes=axes, angles=tuple(np.array(self.angles) - angle))
 
     def describe_lengths(self) -> str:
         """Write the four lengths with four significant digits, in mm."""
@@ -555,10 +553,10 @@ class LoopMeasurement:
     advice: SettingsAdvice | None
     as_it_is: bool
     """True if contacts, joint limits and other motors acted as in the file."""
-    flywheel: float
-    """Armature of the driven hinge that drives, kg m^2."""
-    unmet_stops: list[int]
-    """Hinges of the loop whose stops ended no state."""
+    parts: tuple[str, ...]
+    """Sentences that say which joint is which pin, and which body which bar."""
+    described: Mapping[str, ModelEntry]
+    """Entries of the model by their keys. Stops that ended no state are none."""
 
     @property
     def left_assembly(self) -> bool:

@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,6 @@ from fourbar_validation.engines.description import Value
 from fourbar_validation.engines.mujoco.describe import (
     STIFFEST,
     UNLIMITED_RANGE,
-    Described,
     describe_model,
     mend_entry,
     word_of_number,
@@ -44,7 +43,6 @@ from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
     find_loops,
 )
-from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.inside import LoopInside
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     HIDING,
@@ -52,7 +50,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
-    PoseOptions,
     RobotFile,
     RobotMeasurement,
     TornState,
@@ -86,12 +83,13 @@ WHOLE_TURN = math.tau * (1.0 - 1e-9)
 
 
 def measure_loops(
-    file: RobotFile, options: MeasureOptions, scene: Scene | None
+    file: RobotFile | None, options: MeasureOptions, scene: Scene | None
 ) -> RobotMeasurement:
     """Measure the loops of a robot.
 
     Parameters
     ----------
+    file : None: the one that is generated from the scene.
     scene : of the loop, of several the one whose lengths fit; None: it is made from the
         file.
 
@@ -102,8 +100,10 @@ def measure_loops(
     with collect_warnings() as warnings:
         if scene is not None:
             scene = options.state_speed(scene)
+            file = file or _generate(scene)
             found = [find_loop_of_scene(file, scene, options)]
         else:
+            assert file is not None
             found = [*_find_loops(file, options)]
         share = 1.0 / len(found)
         measured = tuple(measure_loop(one, options, share=share) for one in found)
@@ -132,14 +132,7 @@ def put_loop_inside(
     """
     model = found.robot.model if model is None else model
     scene = found.scene
-    inside = LoopInside(
-        model,
-        found.loop,
-        LoopDrive(model, found.loop, scene),
-        bar=command(scene).bar,
-        branch=scene.motion.branch,
-        as_it_is=found.as_it_is,
-    )
+    inside = LoopInside(model, found.loop, scene, as_it_is=found.as_it_is)
     flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
     inside.find_flywheel(sum(one.inertia for one in flywheels))
     return inside, thin_out(_choose_motion(scene), POSITIONS_OF_A_LOOP)
@@ -151,7 +144,6 @@ def measure_loop(
     model: mujoco.MjModel | None = None,
     *,
     share: float = 1.0,
-    briefly: bool = False,
 ) -> LoopMeasurement:
     """Measure a loop at the motion of its scene.
 
@@ -159,7 +151,6 @@ def measure_loop(
     ----------
     model : changed model of the file; None: the file's own.
     share : part of the time in which settings are looked for.
-    briefly : nothing but torque, pin forces and motion is measured.
     """
     inside, motion = put_loop_inside(found, model)
     loop = inside.loop
@@ -180,6 +171,7 @@ def measure_loop(
             f"are {loop.describe_lengths()}"
         )
     scales = states.scales(inside.lever)
+    seen = found.see()
     through: InsideAnswer | None = None
     refusal = ""
     closing = motion
@@ -188,7 +180,7 @@ def measure_loop(
     try:
         if not motion[:, 1].any() or len(closing) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
-        if found.see().closed_by == "nothing":
+        if seen.closed_by == "nothing":
             raise LimitError("nothing closes the loop")
         through = inside.answer_through_time(closing)
     except LimitError as error:
@@ -199,7 +191,7 @@ def measure_loop(
         starts = thin_out(closing, _TORN_POSITIONS)[:, 0].tolist()
         torn = inside.answer_under_torque(starts, options.torque, seconds)
     advice = None
-    if options.error is not None and not briefly:
+    if options.error is not None:
         if varies(motion):
             raise LimitError(
                 f"settings are tried in one motion through time: {refusal}"
@@ -207,6 +199,10 @@ def measure_loop(
         search = SettingsSearch(inside, closing, share)
         advice = search.advise(options.error, found.file)
     remarks += _describe_findings(inside, states, through)
+    described = describe_model(seen, inside.flywheel)
+    for joint in inside.list_unmet_stops():
+        entry = f"pins.{seen.pins[joint]}.range"
+        described[entry] = described[entry]._replace(value=UNLIMITED_RANGE)
     ties = (describe_equality(inside.model, one) for one in loop.other_equalities)
     option = inside.model.opt
     return LoopMeasurement(
@@ -225,8 +221,8 @@ def measure_loop(
         torn,
         advice,
         inside.as_it_is,
-        inside.flywheel,
-        inside.list_unmet_stops(),
+        found.parts,
+        described,
     )
 
 
@@ -256,8 +252,8 @@ def _describe_findings(
             f"its drive on pin {pin}, {describe_actuator(model, number)}, is taken off:"
             " the torque is solved for"
         )
-    if inside.acting is not None and inside.acting.cylinder is not None:
-        name = model.actuator(inside.acting.cylinder.actuator).name
+    for number in inside.drive.cylinders:
+        name = model.actuator(number).name
         yield f"its actuator {name!r} gives the cylinder's force that is solved for"
     if inside.as_it_is and inside.contacts:
         contacts = write_count(inside.contacts, "contact")
@@ -349,18 +345,8 @@ evaluations.
 """
 GENERATED = Path("generated.xml")
 """Name of the file that is generated from a scene."""
-_PLAIN = MeasureOptions(PoseOptions())
 Changes = Sequence[tuple[str, Value | None]]
 """Keys of entries, each with the value that it gets."""
-
-
-@dataclass(slots=True)
-class Examined:
-    """Results of examining one file."""
-
-    described: Described
-    measured: LoopMeasurement
-    notes: list[str]
 
 
 def _generate(scene: Scene) -> RobotFile:
@@ -383,27 +369,6 @@ def _generate(scene: Scene) -> RobotFile:
     return RobotFile(GENERATED, write_mjcf(scene, drive=drive))
 
 
-def examine_file(
-    scene: Scene,
-    file: RobotFile | None,
-    options: MeasureOptions = _PLAIN,
-) -> Examined:
-    """Describe the loop of a file that is nearest to a scene, and measure it.
-
-    None: the file that is generated from the scene.
-    """
-    with collect_warnings() as warnings:
-        found = find_loop_of_scene(file or _generate(scene), scene, options)
-        measured = measure_loop(found, options, briefly=True)
-        described = describe_model(found.see(), measured.flywheel)
-    for pin, joint in found.loop.hinges.items():
-        if joint in measured.unmet_stops:
-            key = f"pins.{pin}.range"
-            described[key] = described[key]._replace(value=UNLIMITED_RANGE)
-    notes = [*found.robot.notes, *found.parts, *warnings]
-    return Examined(described, measured, notes)
-
-
 def examine_mended(
     scene: Scene, file: RobotFile, options: MeasureOptions, changes: Changes
 ) -> list[LoopMeasurement | None]:
@@ -422,7 +387,7 @@ def examine_mended(
         mended = all(mend_entry(seen, *each) for each in (*kept, change))
         if mended and time.process_time() < end:
             with collect_warnings():
-                one = measure_loop(found, options, seen.model, briefly=True)
+                one = measure_loop(found, options, seen.model)
             if change[0].endswith(HIDING):
                 kept.append(change)
         measured.append(one)

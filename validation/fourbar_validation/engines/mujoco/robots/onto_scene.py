@@ -18,7 +18,7 @@ import numpy as np
 from fourbar.effects import Gravity
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import find_circuit
-from fourbar.linkage import ENDS, record
+from fourbar.linkage import record
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar.scene.motion import BRANCH_NAMES, CROSSED, OPEN
@@ -52,7 +52,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     move_to,
     pose_robot,
 )
-from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, SeenLoop, list_bars
+from fourbar_validation.engines.mujoco.robots.seen import LoopFrame, SeenLoop
 
 _NOTHING_CLOSES = {
     "MJCF": (
@@ -174,11 +174,10 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
 
     def rank(way: RobotLoop) -> tuple[int, float, int]:
         missed = ALIKE * round(miss_lengths(scene, way) / ALIKE)
-        misnamed = _count_misnamed(model, way, wanted)
-        return misnamed, missed, _count_misnamed(model, way, usual)
+        return _count_misnamed(way, wanted), missed, _count_misnamed(way, usual)
 
     loop = min(ways, key=rank)
-    if _count_misnamed(model, loop, wanted):
+    if _count_misnamed(loop, wanted):
         stated = ", ".join(f"{role}={names[body]}" for role, body in wanted.items())
         bars = "; ".join(_write_bars(model, way) for way in ways)
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
@@ -197,12 +196,9 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
     )
 
 
-def _count_misnamed(
-    model: mujoco.MjModel, loop: RobotLoop, bodies: Mapping[str, int]
-) -> int:
+def _count_misnamed(loop: RobotLoop, bodies: Mapping[str, int]) -> int:
     """Count the roles whose body is no part of the bar of that role."""
-    bars = list_bars(model, loop)
-    return sum(bars[body] != BAR_ROLES[role] for role, body in bodies.items())
+    return sum(loop.bars[body] != BAR_ROLES[role] for role, body in bodies.items())
 
 
 def _write_bars(model: mujoco.MjModel, loop: RobotLoop) -> str:
@@ -241,7 +237,7 @@ def close_onto(
         posed = move_to(posed, _leave_flat(scene, posed, seen))
         seen = _place(seen, posed)
     ways = [(seen, posed)]
-    reflected = LoopInside(posed.model, seen, bar=bar).reflect()
+    reflected = LoopInside(posed.model, seen, scene).reflect()
     if reflected is not None:
         there = move_to(posed, reflected)
         ways.append((_place(seen, there), there))
@@ -277,16 +273,16 @@ def close_onto(
 
 def _place(loop: RobotLoop, posed: PosedRobot) -> RobotLoop:
     """Return a loop of a robot in another pose."""
-    placed = replace(loop, qpos=posed.data.qpos.copy())
-    lines = tuple(map(LoopFrame(placed, posed.data).line, ENDS))
-    return replace(placed, lines=lines, stated_lines=lines)
+    placed = LoopFrame(loop, posed.data).place()
+    stated = placed["angles"]
+    return replace(loop, qpos=posed.data.qpos.copy(), stated_angles=stated, **placed)
 
 
 def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:
     """Return a pose at an angle of the scene at which the bars are not in line."""
-    commanded = command(scene)
-    inside = LoopInside(posed.model, turn(loop, scene), bar=commanded.bar)
-    poses = [inside.close(angle) for angle in np.unique(commanded.angle).tolist()]
+    angles = np.unique(command(scene).angle).tolist()
+    inside = LoopInside(posed.model, turn(loop, scene), scene)
+    poses = map(inside.close, angles)
     closed = [loop.qpos, *(qpos for qpos in poses if qpos is not None)]
     return max(closed, key=lambda qpos: abs(inside.measure_sine(qpos)))
 
@@ -303,7 +299,7 @@ def _fits_gravity(
     model = posed.model
     turned = loop.angles[0] - scene.linkage.ground_angle
     gravity = model.opt.gravity * is_enabled(model, "gravity")
-    in_scene = LoopFrame(replace(loop, turned=turned), posed.data)
+    in_scene = LoopFrame(loop.turn(turned), posed.data)
     effects = (one for one in scene.effects if isinstance(one, Gravity))
     wanted = sum(complex(*one.vector) for one in effects)
     pull = complex(*in_scene.in_plane(gravity))
@@ -350,4 +346,4 @@ def turn(loop: RobotLoop, scene: Scene) -> RobotLoop:
 
     nearest = math.ceil(away - 0.5 - 1e-6)
     turns = min((nearest, nearest - 1, nearest + 1), key=rank)
-    return replace(loop, turned=turned - math.tau * turns)
+    return loop.turn(turned - math.tau * turns)

@@ -8,7 +8,6 @@ MuJoCo's arrays: of a body's bearer on it, and of an equality.
 import math
 from collections.abc import Iterable, Mapping
 from copy import copy
-from functools import cache
 
 import mujoco
 import numpy as np
@@ -16,7 +15,6 @@ import numpy as np
 from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.closed_loop import find_site_load
 from fourbar_validation.engines.mujoco.robots.ancestry import (
-    climb,
     find_bits,
     find_tied_bodies,
     list_closing,
@@ -114,42 +112,22 @@ def copy_for_closures(
     return alone
 
 
-class BearerForces:
-    """Forces on the bodies of a model from those that bear them.
+def find_bearer_forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Return the force of each body's bearer on it, world axes, (nbody, 3), N.
 
-    MuJoCo's `cfrc_int` counts in what an actuator on a site and gravity compensation
-    exert on the body, and on all that it bears.
+    MuJoCo's `cfrc_int` balances the forces that it knows of. Those of actuators on
+    sites and of gravity compensation are generalized forces to it, which it would count
+    into what the bearer exerts; here they are applied to the bodies.
     """
-
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model = model
-        on_sites = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-        self.loads: list[int] = np.flatnonzero(on_sites).tolist()
-        self.lifted = list_lifted_masses(model)
-        self.find_borne = cache(self._find_borne)
-
-    def read(self, data: mujoco.MjData, body: int) -> Array:
-        """Return the force of a body's bearer on it, world axes, (3,), N.
-
-        The state is one after `mj_rnePostConstraint`.
-        """
-        loads, lift = self.find_borne(body)
-        force = data.cfrc_int[body, 3:] - lift
-        for load in loads:
-            force -= find_site_load(self.model, data, load)()
-        return np.asarray(force)
-
-    def _find_borne(self, body: int) -> tuple[list[int], Array]:
-        """Return the actuators and the lift, (3,), N, on a body and what it bears."""
-        model = self.model
-        loads = []
-        for load in self.loads:
-            site = model.actuator_trnid[load, 0]
-            if body in climb(model, model.site_bodyid[site]):
-                loads.append(load)
-        lifted = np.flatnonzero(self.lifted)
-        borne = [number for number in lifted if body in climb(model, int(number))]
-        return loads, np.asarray(-self.lifted[borne].sum() * model.opt.gravity)
+    applied = data.xfrc_applied.copy()
+    on_sites = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+    for load in np.flatnonzero(on_sites):
+        body = model.site_bodyid[model.actuator_trnid[load, 0]]
+        data.xfrc_applied[body, :3] += find_site_load(model, data, load)()
+    data.xfrc_applied[:, :3] -= np.outer(list_lifted_masses(model), model.opt.gravity)
+    mujoco.mj_rnePostConstraint(model, data)
+    data.xfrc_applied[:] = applied
+    return data.cfrc_int[:, 3:].copy()
 
 
 def read_equality_force(data: mujoco.MjData, equality: int) -> Array:

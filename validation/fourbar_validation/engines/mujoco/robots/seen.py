@@ -1,7 +1,6 @@
 """A loop in a state of its model, in the axes of its scene, and what is seen of it."""
 
 import cmath
-import math
 from typing import NamedTuple
 
 import mujoco
@@ -12,7 +11,6 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     EQUALITY_KINDS,
     find_ends,
-    find_roots,
     is_enabled,
     list_actuators,
     list_joints_of_tendon,
@@ -30,16 +28,6 @@ _AT_A_PIN = 1e-9
 """Part of a bar's length below which a place is its first pin, but for round-off."""
 
 
-def list_bars(model: mujoco.MjModel, loop: RobotLoop) -> list[int | None]:
-    """List the bar, 1 to 4, that each body belongs to; None: it belongs to none.
-
-    What hangs on a bar by joints that are held belongs to it.
-    """
-    roots = find_roots(model, {*loop.held})
-    bars = {roots[body]: bar for bar, bodies in loop.bodies.items() for body in bodies}
-    return [bars.get(root) for root in roots]
-
-
 class LoopFrame:
     """Plane of a loop in a state whose kinematics are evaluated."""
 
@@ -47,11 +35,8 @@ class LoopFrame:
         self.loop = loop
         self.data = data
         ground = data.xmat[loop.bodies[1][0]].reshape(3, 3)
-        axes = loop.axes @ ground.T
-        self.normal: Array = axes[2]
-        cos = math.cos(loop.turned)
-        sin = math.sin(loop.turned)
-        self.axes: Array = np.array([[cos, sin], [-sin, cos]]) @ axes[:2]
+        *in_plane, self.normal = loop.axes @ ground.T
+        self.axes: Array = np.array(in_plane)
         """x and y of the scene in world axes, (2, 3)."""
 
     def in_plane(self, vector: Array) -> Array:
@@ -78,6 +63,12 @@ class LoopFrame:
     def angle(self, bar: int) -> float:
         """Return the angle of a bar's line, rad."""
         return cmath.phase(self.line(bar))
+
+    def place(self) -> dict[str, tuple[float, ...]]:
+        """Return lengths, m, and angles, rad, of bars 1 to 4, by fields of the loop."""
+        lines = [*map(self.line, ENDS)]
+        lengths = tuple(map(abs, lines))
+        return {"lengths": lengths, "angles": tuple(map(cmath.phase, lines))}
 
     def resolve(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector of the world along a bar's line and to its left."""
@@ -118,9 +109,9 @@ class SeenLoop(LoopFrame):
         driven = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         self.drives = [] if driven is None else list_actuators(model, driven)
         self.hinge = loop.hinges
+        self.pins = {joint: pin for pin, joint in loop.hinges.items()}
         self.sense = loop.senses
         self.closure = loop.equality
-        self._bars = list_bars(model, loop)
 
     @property
     def plane(self) -> str:
@@ -156,13 +147,9 @@ class SeenLoop(LoopFrame):
         joints = list_joints_of_tendon(self.model, tendon)
         return not joints.isdisjoint(self.hinge.values())
 
-    def bar(self, body: int) -> int | None:
-        """Return the bar that a body belongs to, None if it belongs to none."""
-        return self._bars[body]
-
     def list_parts(self, bar: int) -> list[int]:
         """List the bodies of a bar."""
-        return [body for body in range(self.model.nbody) if self.bar(body) == bar]
+        return [body for body, of in enumerate(self.loop.bars) if of == bar]
 
     def polar(self, bar: int, place: Array) -> tuple[float, float]:
         """Return a place from the first pin of a bar: distance, m, and angle, rad.
