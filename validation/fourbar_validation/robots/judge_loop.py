@@ -12,7 +12,7 @@ import numpy as np
 
 from fourbar.formulas.mobility import change_points
 from fourbar.linkage import record
-from fourbar.quantities import COUPLE, OK, UNKNOWNS, Array
+from fourbar.quantities import OK, UNKNOWNS, Array
 from fourbar.scene import Command, Scene, command, find_signs
 from fourbar.scene.motion import COMMAND_NAMES
 from fourbar.solution import Solution
@@ -28,8 +28,9 @@ from fourbar_validation.compare.tolerance import (
     divide,
     find_condition,
     hold_simulated,
+    magnitude,
 )
-from fourbar_validation.engines.description import name_driving
+from fourbar_validation.engines.description import list_unknowns
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     HIDING,
     MOTION_OF_BARS,
@@ -39,7 +40,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     MeasureOptions,
     PoseOptions,
     RobotFile,
-    measure_sizes,
 )
 from fourbar_validation.report.templating import write_error
 from fourbar_validation.robots.differences import (
@@ -236,7 +236,7 @@ def answer_changed(scene: Scene, one: Difference, at: Command) -> Answer | None:
     motion = replace(scene.motion, branch=int(branch[0]))
     changed = replace(changed, motion=motion)
     solution = solve(changed, "force", at=at._replace(branch=branch))
-    names = {*JUDGED_QUANTITIES} - {COUPLE.value} | {name_driving(scene)}
+    names = list_unknowns(scene, JUDGED_QUANTITIES)
     quantities = {name: np.asarray(getattr(solution, name)) for name in names}
     closed = solution.status_code == OK
     return Answer(FILE_AT_ONE_STATE, "formulas", at, closed, quantities)
@@ -271,6 +271,8 @@ def judge_answers(
     softness: Mapping[str, float] | None = None,
 ) -> list[Row]:
     """Hold answers on a measured loop to a tolerance; see `list_rows`."""
+    softness = softness or {}
+    vanishing = measured.find_vanishing()
     scene = measured.scene
     at = command(scene)
     judged = [name for name in JUDGED_QUANTITIES if name not in COMMAND_NAMES[at.bar]]
@@ -283,9 +285,9 @@ def judge_answers(
         formulas = solve(scene, "force", at=answer.at)
 
         def predicted(quantity: str, _: Mask, formulas: Solution = formulas) -> Array:
-            left = (softness or {}).get(_name_force(scene, quantity), 0.0)
-            largest = float(np.nanmax(measure_sizes(getattr(formulas, quantity))))
-            units = {"theta": 1.0, "omega": measure_sizes(formulas.at.speed).max()}
+            left = softness.get(quantity, 0.0)
+            largest = float(np.nanmax(magnitude(getattr(formulas, quantity))))
+            units = {"theta": 1.0, "omega": np.abs(formulas.at.speed).max()}
             unit = float(units.get(quantity[:5], largest))
             condition = find_condition(quantity, scene.linkage, formulas)
             turned = divide(rounding * unit, condition)
@@ -296,20 +298,14 @@ def judge_answers(
         if softness:
             held = held._replace(predicted=predicted, method=f", {_BY_STIFFEST}")
         for row in Comparison(name, scene, answer, formulas, held).rows():
-            force = _name_force(scene, row.quantity)
-            scale = measured.find_vanishing(force)
+            scale = vanishing.get(row.quantity)
             if scale is None or answer.refusal is not None:
                 rows.append(row)
                 continue
-            left = TIMES_PREDICTED * (softness or {}).get(force, 0.0) / scale
+            left = TIMES_PREDICTED * softness.get(row.quantity, 0.0) / scale
             allowed = max(tolerance.factor, min(left, _MOST_ALLOWED))
             rows.append(_judge_vanishing(row, answer, formulas, scale, allowed))
     return rows
-
-
-def _name_force(scene: Scene, quantity: str) -> str:
-    """Return the name of a quantity in a measurement: the drive is its torque."""
-    return COUPLE.value if quantity == name_driving(scene) else quantity
 
 
 def _judge_vanishing(
@@ -317,7 +313,7 @@ def _judge_vanishing(
 ) -> Row:
     """Judge a quantity that is the rounding of its terms by the scale of these."""
     ours = np.asarray(getattr(formulas, row.quantity))
-    errors = measure_sizes(answer.quantities[row.quantity] - ours) / scale
+    errors = magnitude(answer.quantities[row.quantity] - ours) / scale
     return Row.judged(
         (row.scene, row.engine, row.setting),
         row.quantity,

@@ -331,11 +331,6 @@ def _write_angle(symbol: str, equality: JointEquality) -> str:
     return f"{symbol}_{turned}" + (f" - {symbol}_{bearer}" if bearer > 1 else "")
 
 
-def _write_ratio(equality: JointEquality) -> str:
-    speed = _write_angle("omega", equality)
-    return f"({speed})/omega_2" if " " in speed else f"{speed}/omega_2"
-
-
 def _write_theta_2(report: _MimicReport) -> str:
     """Write theta_2 as what the file makes it: the leader and an angle."""
     equality = report.equality
@@ -360,6 +355,9 @@ def _write_errors(report: _MimicReport) -> str:
     if math.isnan(report.centred):
         return "what the polynomial of the file loses depends on theta_2 at that zero"
     angle = _write_angle("theta", equality)
+    speed = _write_angle("omega", equality)
+    if " " in speed:
+        speed = f"({speed})"
     through_zero = ""
     missing = ""
     if report.zeros:
@@ -379,7 +377,7 @@ def _write_errors(report: _MimicReport) -> str:
         f"largest error of the angle: {through_zero}"
         f"{_deg(report.shifted)} deg with the constant of least squares, "
         f"{_deg(report.centred)} deg with the best one; "
-        f"of the ratio {_write_ratio(equality)}: "
+        f"of the ratio {speed}/omega_2: "
         f"{_write(report.ratio, 4)}{missing}"
     )
 

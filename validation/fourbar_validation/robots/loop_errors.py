@@ -18,13 +18,12 @@ from fourbar.scene import Command, Scene
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar_validation.compare.reversals import mark_reversing
+from fourbar_validation.compare.tolerance import divide
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
-    FORCE_QUANTITIES,
     InsideAnswer,
     LoopMeasurement,
     MeasureOptions,
     RobotMeasurement,
-    divide,
     measure_sizes,
 )
 from fourbar_validation.robots.files import read_robot
@@ -73,7 +72,7 @@ class InsideError:
     @property
     def part(self) -> float:
         """The error over its scale; infinite without an answer."""
-        return divide(self.error, self.scale)
+        return float(divide(self.error, self.scale))
 
     def cells(self) -> tuple[str, ...]:
         """Return method, quantity, error, relative size, place and median, as text."""
@@ -152,26 +151,24 @@ def _compare(
     commanded, formulas = _solve_formulas(loop, answer)
     judged = ~mark_reversing(loop.scene, formulas, _SLIP)
     errors = answer.errors()
-    rigid = loop.collect(answer, "rigid").items()
+    rigid = loop.collect(answer, "rigid")
     if method == RIGID:
         judged &= formulas.status_code == OK
-    for name, (quantity, force) in zip(FORCE_QUANTITIES, rigid, strict=True):
-        sizes = errors[name]
-        if method == RIGID:
-            sizes = measure_sizes(force - np.asarray(getattr(formulas, quantity)))
-        sizes = np.where(np.isfinite(sizes), sizes, math.inf)
+        errors = measure_sizes(rigid[q] - getattr(formulas, q) for q in rigid)
+    vanishing = loop.find_vanishing()
+    columns = zip(rigid, errors.T, loop.scales.tolist(), strict=True)
+    for quantity, sizes, scale in columns:
         worst = int(np.argmax(np.where(judged, sizes, -1.0)))
-        scale = loop.scales[name]
         error = median = math.inf
         if judged.any() and not answer.lost:
             error = float(sizes[worst])
-            median = divide(float(np.median(sizes[judged])), scale)
+            median = float(divide(np.median(sizes[judged]), scale))
         yield InsideError(
             method,
             quantity,
             error,
             scale,
-            loop.find_vanishing(name) is not None,
+            quantity in vanishing,
             rows[worst].joint,
             float(np.asarray(formulas.theta_2)[worst]),
             float(commanded.angle[worst]),

@@ -212,10 +212,6 @@ class LoopInside:
         self.contacts = 0
         """Most contacts in a state."""
 
-    def with_model(self, model: mujoco.MjModel) -> "LoopInside":
-        """Return the same loop in a changed model, with nothing but it acting."""
-        return LoopInside(model, self.loop, self.scene)
-
     def _switch_off(self) -> None:
         """Switch off what acts on the loop beside its drive."""
         off = self.taken_off

@@ -6,6 +6,7 @@ Everything here is plain data, without MuJoCo.
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, record
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, command
-from fourbar_validation.compare.tolerance import WELL_CONDITIONED
+from fourbar_validation.compare.tolerance import WELL_CONDITIONED, divide, magnitude
 from fourbar_validation.engines.description import ModelEntry, list_unknowns
 
 BAR_ROLES = {BAR_NAMES[bar]: bar for bar in MOVING_BARS}
@@ -344,18 +345,13 @@ def thin_out(motion: Array, most: int) -> Array:
     return np.asarray(motion[places.round().astype(int)])
 
 
-def measure_sizes(values: Any) -> Array:
-    """Return the sizes of numbers (n,) or of vectors (n, 2), (n,)."""
-    numbers = np.asarray(values, dtype=float)
-    return np.asarray(np.abs(numbers) if numbers.ndim == 1 else np.hypot(*numbers.T))
+def measure_sizes(quantities: Iterable[Array]) -> Array:
+    """Return the sizes of k quantities, numbers (n,) or vectors (n, 2), (n, k)."""
+    return np.column_stack([*map(magnitude, quantities)])
 
 
-def find_scales(
-    sizes: Mapping[str, Array],
-    conditions: Array,
-    lever: float,
-) -> dict[str, float]:
-    """Return what the errors of torque and pin forces are divided by, N m and N.
+def find_scales(sizes: Array, conditions: Array, lever: float) -> Array:
+    """Return what the errors of torque and pin forces are divided by, (5,), N m and N.
 
     The scale of each is its largest size. One that is the round-off of its terms at
     every well-conditioned state is a sum that cancels: its scale is that of the terms,
@@ -363,29 +359,16 @@ def find_scales(
 
     Parameters
     ----------
-    sizes : size of the torque and of each pin force at each state, (n,), N m and N.
+    sizes : sizes of FORCE_QUANTITIES at each state, (n, 5), N m and N.
     conditions : |sin| of the angle between the bars that follow at each state, (n,).
     lever : longest moving bar, m; 1 where the drive is a force.
     """
-    force = np.max([sizes[name] for name in PIN_FORCES], axis=0)
+    levers = [lever, *(1.0 for _ in PIN_FORCES)]
+    terms = np.outer(sizes[:, 1:].max(axis=1), levers)
     well = conditions >= WELL_CONDITIONED
-    scales = {}
-    for name in FORCE_QUANTITIES:
-        terms = force
-        if name == "torque":
-            terms = force * lever
-        cancels = sizes[name] <= ROUND_OFF_OF_A_FILE * terms
-        vanishes = well.any() and cancels[well].all()
-        scale = terms if vanishes else sizes[name]
-        scales[name] = float(scale.max(initial=0.0))
-    return scales
-
-
-def divide(error: float, scale: float) -> float:
-    """Return an error over its scale; without a scale it is infinite, or zero."""
-    if scale and math.isfinite(error):
-        return error / scale
-    return math.inf if error else 0.0
+    cancels = sizes <= ROUND_OFF_OF_A_FILE * terms
+    vanishes = well.any() & cancels[well].all(axis=0)
+    return np.asarray(np.where(vanishes, terms, sizes).max(axis=0, initial=0.0))
 
 
 class WorstState(NamedTuple):
@@ -425,35 +408,35 @@ class InsideAnswer:
     seconds_per_step: float = math.inf
     """Processor time of a step of the whole robot between two states, the least, s."""
 
-    def errors(self) -> dict[str, Array]:
-        """Return the size of the error of torque and pin forces, (n,), N m and N."""
-        soft = self.rows.soft
-        rigid = self.rows.rigid
-        return {
-            name: measure_sizes(soft[name] - rigid[name]) for name in FORCE_QUANTITIES
-        }
+    def errors(self) -> Array:
+        """Return the sizes of the errors of FORCE_QUANTITIES, (n, 5), N m and N.
 
-    def sizes(self) -> dict[str, Array]:
-        """Return the sizes of torque and pin forces of rigid pins, (n,), N m and N."""
-        rigid = self.rows.rigid
-        return {name: measure_sizes(rigid[name]) for name in FORCE_QUANTITIES}
+        An error is infinite without an answer.
+        """
+        rows = self.rows
+        errors = measure_sizes(rows.soft[q] - rows.rigid[q] for q in FORCE_QUANTITIES)
+        return np.where(np.isfinite(errors), errors, math.inf)
 
-    def scales(self, lever: float) -> dict[str, float]:
+    def sizes(self) -> Array:
+        """Return the sizes of FORCE_QUANTITIES of rigid pins, (n, 5), N m and N."""
+        return measure_sizes(self.rows.rigid[name] for name in FORCE_QUANTITIES)
+
+    def scales(self, lever: float) -> Array:
         """Return what errors are divided by, from rigid pins, as `find_scales` does."""
         return find_scales(self.sizes(), self.rows.condition, lever)
 
-    def find_worst(self, scales: Mapping[str, float]) -> WorstState:
+    def find_worst(self, scales: Array) -> WorstState:
         """Return the state of the worst error of torque and pin forces over its scale.
 
         The error is infinite without an answer.
         """
         if self.lost or not len(self.rows):
             return WorstState(math.inf)
-        return max(
-            WorstState(divide(float(error), scales[name]), name, row.joint, row.angle)
-            for name, errors in self.errors().items()
-            for row, error in zip(self.rows, errors, strict=True)
-        )
+        parts = divide(self.errors(), scales)
+        state, column = np.unravel_index(parts.argmax(), parts.shape)
+        row = self.rows[state]
+        quantity = FORCE_QUANTITIES[column]
+        return WorstState(float(parts[state, column]), quantity, row.joint, row.angle)
 
 
 @record
@@ -544,8 +527,8 @@ class LoopMeasurement:
     switched_off: tuple[str, ...]
     """Equalities between its moving bars and joints that are held."""
     states: InsideAnswer
-    scales: dict[str, float]
-    """Scale of the errors of torque and of each pin force, N m and N."""
+    scales: Array
+    """Scales of the errors of FORCE_QUANTITIES, (5,), N m and N."""
     through_time: InsideAnswer | None
     refusal: str
     """Why it was not simulated; empty where it was."""
@@ -590,13 +573,15 @@ class LoopMeasurement:
         pairs = zip(names, FORCE_QUANTITIES, strict=True)
         return {name: np.asarray(forces[field]) for name, field in pairs}
 
-    def find_vanishing(self, quantity: str) -> float | None:
-        """Return the scale of the terms of a quantity that is their rounding."""
-        sizes = self.states.sizes()
-        scale = self.scales.get(quantity)
-        if scale is None or scale == float(sizes[quantity].max()):
-            return None
-        return scale
+    def find_vanishing(self) -> dict[str, float]:
+        """Return the scale of the terms of each quantity that is their rounding.
+
+        The names are those of the scene.
+        """
+        vanishes = self.scales != self.states.sizes().max(axis=0)
+        names = list_unknowns(self.scene, FORCE_QUANTITIES)
+        scales = zip(names, self.scales.tolist(), strict=True)
+        return dict(compress(scales, vanishes))
 
     @property
     def moves(self) -> bool:

@@ -24,10 +24,9 @@ from fourbar.mjcf.document import Drive
 from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import CROSSED, OPEN, Motion
-from fourbar.show.panels import split_runs
 from fourbar.solving import solve
-from fourbar_validation.compare.tolerance import wrap_difference
-from fourbar_validation.engines.description import Value
+from fourbar_validation.compare.tolerance import magnitude, wrap_difference
+from fourbar_validation.engines.description import Value, name_driving
 from fourbar_validation.engines.mujoco.describe import (
     STIFFEST,
     UNLIMITED_RANGE,
@@ -54,7 +53,6 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     RobotMeasurement,
     TornState,
     make_motion,
-    measure_sizes,
     thin_out,
     varies,
 )
@@ -125,7 +123,7 @@ def _find_loops(file: RobotFile, options: MeasureOptions) -> Iterator[LoopOfScen
 def put_loop_inside(
     found: LoopOfScene, model: mujoco.MjModel | None = None
 ) -> tuple[LoopInside, Array]:
-    """Return a loop as its scene drives it, and the motion of the scene in it.
+    """Return a loop as its scene drives it, and the motion by rising angles, (n, 3).
 
     The file's own cylinder drives it if it can. `model`: changed model of the file;
     None: the file's own.
@@ -135,7 +133,16 @@ def put_loop_inside(
     inside = LoopInside(model, found.loop, scene, as_it_is=found.as_it_is)
     flywheels = (one for one in scene.effects if isinstance(one, Flywheel))
     inside.find_flywheel(sum(one.inertia for one in flywheels))
-    return inside, thin_out(_choose_motion(scene), POSITIONS_OF_A_LOOP)
+    commanded = command(scene)
+    if commanded.speed is None:
+        raise InputError(
+            f"motion.omega_{commanded.bar}",
+            None,
+            "is needed: without a speed there is no torque to compare",
+        )
+    states = (commanded.angle, commanded.speed, commanded.acceleration)
+    motion = np.unique(np.column_stack(np.broadcast_arrays(*states)), axis=0)
+    return inside, thin_out(motion, POSITIONS_OF_A_LOOP)
 
 
 def measure_loop(
@@ -176,7 +183,9 @@ def measure_loop(
     refusal = ""
     closing = motion
     if not varies(motion):
-        closing = make_motion(_find_longest_run(states), motion[0, 1:])
+        angles = states.rows.angle
+        runs = np.split(angles, np.searchsorted(angles, states.open))
+        closing = make_motion(max(runs, key=len), motion[0, 1:])
     try:
         if not motion[:, 1].any() or len(closing) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")
@@ -224,14 +233,6 @@ def measure_loop(
         found.parts,
         described,
     )
-
-
-def _find_longest_run(states: InsideAnswer) -> Array:
-    """Return the most angles in a row at which the loop closes, in their order."""
-    angles = np.union1d(states.rows.angle, states.open)
-    closed = np.flatnonzero(np.isin(angles, states.rows.angle))
-    runs = split_runs(closed)
-    return np.asarray(angles[max(runs, key=len)])
 
 
 def _describe_findings(
@@ -287,19 +288,6 @@ def _describe_findings(
         )
 
 
-def _choose_motion(scene: Scene) -> Array:
-    """Return the motion of a scene by rising angles, (n, 3)."""
-    commanded = command(scene)
-    if commanded.speed is None:
-        raise InputError(
-            f"motion.omega_{commanded.bar}",
-            None,
-            "is needed: without a speed there is no torque to compare",
-        )
-    states = (commanded.angle, commanded.speed, commanded.acceleration)
-    return np.unique(np.column_stack(np.broadcast_arrays(*states)), axis=0)
-
-
 def _take_span(
     motion: Array, inside: LoopInside, span: tuple[float, float]
 ) -> tuple[Array, list[str]]:
@@ -318,20 +306,16 @@ def _take_span(
     cut = []
     limited = inside.joint is not None and inside.model.jnt_limited[inside.joint]
     if limited or np.ptp(angles) < WHOLE_TURN:
-        low = max(low, min(joints))
-        high = min(high, max(joints))
-        moved, wanted = (
-            " to ".join(f"{math.degrees(end):.6g}" for end in ends)
-            for ends in ((min(joints), max(joints)), span)
-        )
+        ends = (min(joints), max(joints))
+        low, high = np.clip(span, *ends)
+        first, last = np.degrees(ends)
+        moved = f"the motion of {inside.name}, {first:.6g} to {last:.6g} deg"
         if low >= high:
-            raise InputError(
-                "--range",
-                f"{wanted} deg",
-                f"must overlap the motion of {inside.name}, {moved} deg",
-            )
+            first, last = np.degrees(span)
+            wanted = f"{first:.6g} to {last:.6g} deg"
+            raise InputError("--range", wanted, f"must overlap {moved}")
         if (low, high) != span:
-            cut = [f"--range is cut to the motion of {inside.name}, {moved} deg"]
+            cut = [f"--range is cut to {moved}"]
     if varies(motion):
         raise InputError("--range", None, "needs a motion of one speed")
     sense = inside.position(angles[0] + 1.0) - joints[0]
@@ -397,8 +381,8 @@ def examine_mended(
 def predict_softness(
     scene: Scene, file: RobotFile, options: MeasureOptions
 ) -> dict[str, float]:
-    """Predict the errors by MuJoCo's soft closure of torque, N m, pin forces, N, angles
-    and speeds through time, rad and rad/s.
+    """Predict the errors by MuJoCo's soft closure of the drive, N m or N, pin forces,
+    N, angles and speeds through time, rad and rad/s.
 
     The error of a soft constraint goes as (1 - d)/d in its impedance d. Between
     STIFFEST and an impedance of twice that yield it grows by itself, so the error is
@@ -410,6 +394,7 @@ def predict_softness(
         if not found.robot.model.eq_active0[found.loop.equality]:
             return {}
         stiff, softer = (_answer_at_yield(found, times) for times in (1.0, 2.0))
+    driving = name_driving(scene)
     softness = {}
     for at_stiff, at_softer in zip(stiff, softer, strict=True):
         both = min(len(at_stiff), len(at_softer))
@@ -417,7 +402,8 @@ def predict_softness(
             changes = at_stiff[name][:both] - at_softer[name][:both]
             if name.startswith("theta"):
                 changes = wrap_difference(changes)
-            softness[name] = float(np.nanmax(measure_sizes(changes), initial=0.0))
+            largest = float(np.nanmax(magnitude(changes), initial=0.0))
+            softness[driving if name == "torque" else name] = largest
     return softness
 
 

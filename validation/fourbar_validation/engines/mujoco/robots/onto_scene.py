@@ -172,14 +172,22 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
             wanted[role] = 1 + find_named(names[1:], name, "body", "--name")
     usual = {role: names.index(role) for role in BAR_ROLES if role in names}
 
-    def rank(way: RobotLoop) -> tuple[int, float, int]:
-        missed = ALIKE * round(miss_lengths(scene, way) / ALIKE)
+    def rank(way: RobotLoop) -> tuple[int, int, int]:
+        """Count misnamed bodies and what lengths miss, the sum of |log ratio|."""
+        ratios = np.abs(np.log(lengths) - np.log(way.met))
+        missed = round(float(ratios.sum()) / ALIKE)
         return _count_misnamed(way, wanted), missed, _count_misnamed(way, usual)
 
     loop = min(ways, key=rank)
     if _count_misnamed(loop, wanted):
         stated = ", ".join(f"{role}={names[body]}" for role, body in wanted.items())
-        bars = "; ".join(_write_bars(model, way) for way in ways)
+        bars = "; ".join(
+            ", ".join(
+                f"{role} {name_body(model, way.bodies[bar][0])}"
+                for role, bar in BAR_ROLES.items()
+            )
+            for way in ways
+        )
         raise InputError("--name", stated, f"no four-bar has these bars: {bars}")
     loop, robot = close_onto(scene, posed, loop)
     described = SceneOfLoop(robot, loop)
@@ -199,14 +207,6 @@ def _fit(file: RobotFile, scene: Scene, options: MeasureOptions) -> LoopOfScene:
 def _count_misnamed(loop: RobotLoop, bodies: Mapping[str, int]) -> int:
     """Count the roles whose body is no part of the bar of that role."""
     return sum(loop.bars[body] != BAR_ROLES[role] for role, body in bodies.items())
-
-
-def _write_bars(model: mujoco.MjModel, loop: RobotLoop) -> str:
-    """Write the body of each moving bar."""
-    return ", ".join(
-        f"{role} {name_body(model, loop.bodies[bar][0])}"
-        for role, bar in BAR_ROLES.items()
-    )
 
 
 def close_onto(
@@ -318,12 +318,6 @@ def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
     angle = theta_2 - theta_1 + scene.linkage.ground_angle
     circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
     return circuits
-
-
-def miss_lengths(scene: Scene, loop: RobotLoop) -> float:
-    """Return by how much a loop's lengths miss those of a scene: sum of |log ratio|."""
-    apart = np.log(scene.linkage.lengths) - np.log(loop.met)
-    return float(np.abs(apart).sum())
 
 
 def turn(loop: RobotLoop, scene: Scene) -> RobotLoop:

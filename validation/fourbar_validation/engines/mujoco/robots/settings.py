@@ -164,7 +164,8 @@ class SettingsSearch:
         error.
         """
         given = self.inside
-        inside = given.with_model(set_settings(given.given, given.loop, changes))
+        model = set_settings(given.given, given.loop, changes)
+        inside = LoopInside(model, given.loop, given.scene)
         states = through = InsideAnswer()
         with suppress(LimitError):
             states = inside.answer_states(motion)
