@@ -287,8 +287,8 @@ def judge_answers(
         def predicted(quantity: str, _: Mask, formulas: Solution = formulas) -> Array:
             left = softness.get(quantity, 0.0)
             largest = float(np.nanmax(magnitude(getattr(formulas, quantity))))
-            units = {"theta": 1.0, "omega": np.abs(formulas.at.speed).max()}
-            unit = float(units.get(quantity[:5], largest))
+            speed = np.abs(np.asarray(formulas.at.speed, float)).max()
+            unit = float({"theta": 1.0, "omega": speed}.get(quantity[:5], largest))
             condition = find_condition(quantity, scene.linkage, formulas)
             turned = divide(rounding * unit, condition)
             allowed = turned + TIMES_PREDICTED * left

@@ -229,7 +229,7 @@ def test_a_loop_is_closed_on_a_change_point_that_its_lengths_miss():
     miss = abs(ground + crank - coupler - output)
     assert RESIDUAL_OF_AN_OPEN_LOOP < miss == approx(loop.rounding)
     assert LoopInside(posed.model, loop).close(in_line) is not None
-    exact = replace(loop, read_lengths=())
+    exact = replace(loop, met=loop.lengths)
     assert LoopInside(posed.model, exact).close(in_line) is None
 
 

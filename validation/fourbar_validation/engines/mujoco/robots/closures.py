@@ -6,9 +6,9 @@ no joint parts, or a held one, are one bar.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations, islice, pairwise, permutations
+from itertools import combinations, pairwise, permutations
 from operator import itemgetter
 
 import mujoco
@@ -45,6 +45,7 @@ from fourbar_validation.engines.mujoco.robots.loop_facts import (
     RobotFile,
     RobotLoop,
     RobotReport,
+    round_off,
     write_length,
 )
 from fourbar_validation.engines.mujoco.robots.planes import (
@@ -61,7 +62,6 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     LARGEST_RESIDUAL,
     SLIDE,
     PosedRobot,
-    find_joint,
     pose_robot,
 )
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
@@ -111,16 +111,13 @@ def find_closures(posed: PosedRobot, name: str | None = None) -> list[RobotClosu
     """
     finder = _Finder(posed)
     closures = [finder.describe(number) for number in range(posed.model.neq)]
-    drive = posed.options.drive
-    if drive is not None:
-        joint = find_joint(posed.model, drive, "--drive")
-        loops = [closure.loop for closure in closures if closure.loop is not None]
-        if not any(joint == loop.hinges["O2"] for loop in loops):
-            raise InputError(
-                "--drive",
-                drive,
-                "drives no four-bar: it must be a hinge of one, on its ground",
-            )
+    driven = [closure.loop.joint for closure in closures if closure.loop is not None]
+    if posed.drive is not None and posed.drive not in driven:
+        raise InputError(
+            "--drive",
+            name_joint(posed.model, posed.drive),
+            "drives no four-bar: it must be a hinge of one, on its ground",
+        )
     if name is None:
         return closures
     return [closures[find_named(finder.names, name, "closure", "--loop")]]
@@ -232,7 +229,7 @@ class _Finder:
 
     def __init__(self, posed: PosedRobot) -> None:
         self.posed = posed
-        self.options = posed.options
+
         self.data = posed.data
         model = self.model = posed.model
         names = [describe_equality(model, number) for number in range(model.neq)]
@@ -243,7 +240,7 @@ class _Finder:
             for number, name in enumerate(names)
         ]
         """Name of each equality, which no other has."""
-        self.held = {find_joint(model, name, "--hold") for name in self.options.held}
+        self.held = {*posed.held}
         self.root = find_roots(model, self.held)
         self.standing: dict[int, list[int]] = {}
         """Hinges that cannot turn, by the closure that holds them.
@@ -271,11 +268,11 @@ class _Finder:
     def _is_triangle(self, chain: _Chain) -> bool:
         """Tell whether two parallel hinges, off each other and the closure, stand."""
         is_planar = len(chain.hinges) == len(chain.away) == 2 and chain.skew <= PARALLEL
-        if not (self.options.held and is_planar):
+        if not (self.posed.held and is_planar):
             return False
         first, second = self.data.xanchor[chain.hinges]
         arm = np.cross(first - second, self.data.xaxis[chain.hinges[0]])
-        return bool(np.linalg.norm(arm) > LARGEST_RESIDUAL)
+        return math.hypot(*arm) > LARGEST_RESIDUAL
 
     def join(self, joint: int) -> tuple[int, int]:
         """Return the bar that a joint turns, and the one that bears it."""
@@ -327,7 +324,7 @@ class _Finder:
             first, second = find_ends(model, self.before, chain.number)
             normal = self.normals.get(chain.number, np.zeros(3))
             across = (first - second) @ normal
-            gap = float(np.linalg.norm(first - second - across * normal))
+            gap = math.hypot(*(first - second - across * normal))
             yield f"gap {write_length(gap) if gap > PRINTED_AS_ZERO else 0} mm"
 
     def _describe_mimic(self, number: int, kind: str) -> str:
@@ -494,13 +491,6 @@ class _Finder:
         text = f"{count} and {write_count(freedoms, 'freedom')}"
         return text + (holds or ": no hold makes it a four-bar")
 
-    def _makes_four_bar(self, chain: _Chain, held: Iterable[int]) -> bool:
-        """Tell whether a closure makes a four-bar with these joints held as well."""
-        names = [name_joint(self.model, joint) for joint in held]
-        options = replace(self.options, held=(*self.options.held, *names))
-        finder = _Finder(replace(self.posed, options=options))
-        return finder.describe(chain.number).loop is not None
-
     def _find_coupled(self, chain: _Chain) -> list[_Chain]:
         """List the other closures whose loops move the same bars.
 
@@ -536,14 +526,14 @@ class _Finder:
         if len(holdable) < count:
             holdable = chain.joints
         taken = {joint for other in coupled for joint in other.joints}
-        found = (
-            ",".join(name_joint(self.model, joint) for joint in held)
-            for held in combinations(holdable, count)
-            if chain.others.keys() <= {*held}
-            and not ({*chain.joints} - {*held}) & taken
-            and self._makes_four_bar(chain, held)
-        )
-        holds = [*islice(found, 1 + _MOST_HOLDS)]
+        holds: list[str] = []
+        for held in combinations(holdable, count):
+            free = {*chain.joints} - {*held}
+            if free & chain.others.keys() or free & taken or len(holds) > _MOST_HOLDS:
+                continue
+            posed = replace(self.posed, held=self.posed.held.union(held))
+            if _Finder(posed).describe(chain.number).loop is not None:
+                holds.append(",".join(name_joint(self.model, joint) for joint in held))
         if not holds:
             return ""
         others = f" (or {' or '.join(holds[1:])})" if holds[1:] else ""
@@ -582,7 +572,7 @@ class _Finder:
         """Place of what joins two bars."""
         for joint in hinges:
             across = np.cross(*self.data.xaxis[[joint, min(hinges)]])
-            if float(np.linalg.norm(across)) <= math.sin(PARALLEL):
+            if math.hypot(*across) <= math.sin(PARALLEL):
                 pins[frozenset(self.join(joint))] = self.data.xanchor[joint]
         for one in loops:
             first, last = (self.root[end] for end in one.ends)
@@ -685,9 +675,12 @@ class _Finder:
             held=tuple(sorted(held)),
         )
         loop = replace(loop, axes=self._choose_axes(loop, normal))
-        before = LoopFrame(loop, self.before).place()["angles"]
-        placed = LoopFrame(loop, data).place()
-        loop = replace(loop, stated_angles=before, **placed)
+        _, stated = LoopFrame(loop, self.before).measure_bars()
+        lengths, angles = LoopFrame(loop, data).measure_bars()
+        met = tuple(map(round_off, lengths))
+        loop = replace(
+            loop, lengths=lengths, met=met, angles=angles, stated_angles=stated
+        )
         for length, (one, other) in zip(loop.lengths, ENDS.values(), strict=True):
             if length <= COINCIDENT_PINS * max(loop.lengths):
                 raise _NoFourBarError(
@@ -718,13 +711,12 @@ class _Finder:
         ground.
         """
         gravity = self.model.opt.gravity
-        in_plane = gravity - (gravity @ normal) * normal
-        along = np.cross(normal, in_plane)
-        if np.linalg.norm(in_plane) <= LEVEL_PLANE * np.linalg.norm(gravity):
+        along = np.cross(normal, gravity)
+        if math.hypot(*along) <= LEVEL_PLANE * math.hypot(*gravity):
             frame = LoopFrame(loop, self.data)
             line = frame.locate(1, "O4") - frame.locate(1, "O2")
             along = line - (line @ normal) * normal
-        along = along / (np.linalg.norm(along) or 1.0)
+        along = along / (math.hypot(*along) or 1.0)
         ground = self.data.xmat[loop.bodies[1][0]].reshape(3, 3)
         axes = np.array([along, np.cross(normal, along), normal])
         return np.asarray(axes @ ground)
@@ -738,10 +730,9 @@ class _Finder:
         """
         model = self.model
         at_ground = [joint for joint in ends if joint is not None]
-        if self.options.drive is not None:
-            stated = find_joint(model, self.options.drive, "--drive")
-            if stated in at_ground:
-                return stated, []
+        for joint in at_ground:
+            if joint == self.posed.drive:
+                return joint, []
         driven = [joint for joint in list_motors(model) if joint in chain.joints]
         if not driven:  # one that takes no control drives by a speed that it keeps
             driven = [joint for joint in at_ground if list_actuators(model, joint)]
@@ -817,7 +808,7 @@ class _Finder:
         mujoco.mj_forward(alone, data)
         total = np.sum([read_equality_force(data, one) for one in closures], axis=0)
         across = float(total @ normal)
-        in_plane = float(np.linalg.norm(total - across * normal))
+        in_plane = math.hypot(*(total - across * normal))
         return [
             f"its ends are {write_length(offset)} mm apart along the axes, which no"
             " motion closes: MuJoCo's constraint carries"

@@ -78,6 +78,7 @@ class LoopDrive:
             first, second = self.model.site_bodyid[self.sites].tolist()
             line = end - start
         else:
+            assert isinstance(self.force, LinearDrive)
             first, start = locate(self.force.start)
             second, end = locate(self.force.end)
             line = frame.in_plane(end - start) @ frame.axes

@@ -489,7 +489,7 @@ class LoopInside:
     def _measure_gap(self, qpos: Array) -> float:
         """Measure the distance of the ends of the closure in the plane, m."""
         residual, _ = self._evaluate_closure(qpos)
-        return float(np.linalg.norm(residual[:3]))
+        return math.hypot(*residual[:3])
 
     @property
     def lever(self) -> float:
@@ -530,15 +530,9 @@ class LoopInside:
         limits = data.efc_frictionloss[data.ne : data.nefc]
         needed += rubbing.T @ (limits * np.sign(rubbing @ state.qvel))
         needed -= self.turn * self.flywheel * wanted
-        pull = self.drive.find_pull(data)
-        # M a + c - J^T f = pull s on the hinges of the loop; the closures bear what
-        # is across the pull
-        level = pull[self.moving] / np.linalg.norm(pull[self.moving])
-        away = np.eye(len(self.moving)) - np.outer(level, level)
-        columns = rows[:, self.moving].T
-        multipliers = _solve_least_squares(away @ columns, away @ needed[self.moving])
-        left = needed[self.moving] - columns @ multipliers
-        size = float(left @ level / np.linalg.norm(pull[self.moving]))
+        # M a + c = J^T f + pull s on the hinges of the loop
+        columns = np.vstack([rows, self.drive.find_pull(data)]).T[self.moving]
+        *multipliers, size = _solve_least_squares(columns, needed[self.moving]).tolist()
         data.qacc[:] = accelerations
         data.efc_force[: data.ne] = multipliers
         self.drive.exert(data, size)

@@ -130,7 +130,7 @@ class RobotLoop:
     senses: Mapping[str, float]
     """+1 where the joint's angle grows as the second bar of the pin turns
     counter-clockwise against the first; else -1."""
-    cut_bars: tuple[int, ...]
+    cut_bars: tuple[int | None, ...]
     """Bars that the two ends of the equality are on; empty where it is a weld."""
     axes: Array
     """x, from which angles are counted, y, and the normal of the plane, (3, 3).
@@ -154,10 +154,9 @@ class RobotLoop:
     chosen: tuple[str, ...] = ()
     """Why its driven hinge is taken, where neither a motor nor an option tells."""
     remarks: tuple[str, ...] = ()
-    read_lengths: tuple[float, ...] = ()
-    """Lengths of its scene, m; empty until that is made. Beyond round-off they differ
-    from its own where the digits of the file cannot tell the linkage from one with a
-    change point.
+    met: tuple[float, ...] = ()
+    """Lengths as they are read, m. Beyond round-off they differ from its own where the
+    digits of the file cannot tell the linkage from one with a change point.
     """
     from_other_end: "RobotLoop | None" = None
     """The loop with its output for its input, in the same plane."""
@@ -166,11 +165,6 @@ class RobotLoop:
     def joint(self) -> int:
         """Joint that is driven; pin O2 of a loop as its file has it is a hinge."""
         return self.hinges["O2"]
-
-    @property
-    def met(self) -> tuple[float, ...]:
-        """Lengths of ground, input, coupler and output as they are read, m."""
-        return self.read_lengths or tuple(map(round_off, self.lengths))
 
     @property
     def rounding(self) -> float:

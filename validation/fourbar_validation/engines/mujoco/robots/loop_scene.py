@@ -220,8 +220,7 @@ class SceneOfLoop(SeenLoop):
         self.remarks: list[str] = []
         self.shift = 0.0
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
-        self.carried = {bar: self.list_parts(bar) for bar in MOVING_BARS}
-        self.bodies = {body for bodies in self.carried.values() for body in bodies}
+        self.bodies = {body for body, bar in enumerate(loop.bars) if (bar or 1) > 1}
         gravity = self.model.opt.gravity * is_enabled(self.model, "gravity")
         self.gravity = np.asarray(gravity, float)
 
@@ -324,7 +323,7 @@ class SceneOfLoop(SeenLoop):
                 "lengths read as equal within the digits of the file:"
                 f" {'; '.join(equal)}"
             )
-        self.loop = replace(self.loop, read_lengths=met)
+        self.loop = replace(self.loop, met=met)
         return self.loop
 
     def _meet_lengths(self, lengths: Lengths) -> Lengths:
@@ -335,10 +334,7 @@ class SceneOfLoop(SeenLoop):
             if moved <= finest:  # numbers of fewer digits are meant as they stand
                 rounding += moved
         fine = [find_rounding([length]) <= finest for length in lengths]
-        if not any(fine):
-            return lengths
-        share = rounding / sum(fine)
-        d, a, b, c = (share if is_fine else 0.0 for is_fine in fine)
+        d, a, b, c = (rounding / max(sum(fine), 1) * np.array(fine)).tolist()
         met = meet_change_points(lengths, (d, a, b, c))
         # one equality alone is met by chance: nobody builds it
         return met if count_equalities(met) > 1 else lengths
@@ -390,7 +386,7 @@ class SceneOfLoop(SeenLoop):
         """List the effects, the pins in their order."""
         model = self.model
         pull = self._pull
-        if abs(pull) > ROUND_OFF_OF_LOADS * float(np.linalg.norm(self.gravity)):
+        if abs(pull) > ROUND_OFF_OF_LOADS * math.hypot(*self.gravity):
             yield Gravity(round_off(abs(pull)), _round_angle(cmath.phase(pull)))
         hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
         damping = [_reflect(model, joint, "damping") for joint in hinges.values()]
@@ -434,7 +430,7 @@ class SceneOfLoop(SeenLoop):
         data = self.data
         lifted_masses = list_lifted_masses(self.model)
         for bar in MOVING_BARS:
-            bodies = self.carried[bar]
+            bodies = self.list_parts(bar)
             lifted = lifted_masses[bodies]
             force = -float(lifted.sum()) * self._pull
             if not force:
@@ -522,7 +518,7 @@ class SceneOfLoop(SeenLoop):
         model = self.model
         loop = self.loop
         across = float(self.gravity @ self.normal)
-        if abs(across) > _ACROSS * float(np.linalg.norm(self.gravity)):
+        if abs(across) > _ACROSS * math.hypot(*self.gravity):
             weights = (
                 f"{BAR_NAMES[bar]} {abs(lump.mass * across):.4g} N"
                 for bar, lump in lumps.items()

@@ -185,7 +185,8 @@ def measure_loop(
     if not varies(motion):
         angles = states.rows.angle
         runs = np.split(angles, np.searchsorted(angles, states.open))
-        closing = make_motion(max(runs, key=len), motion[0, 1:])
+        longest = max(runs, key=len)
+        closing = make_motion(longest.tolist(), motion[0, 1:])
     try:
         if not motion[:, 1].any() or len(closing) < 2:
             raise LimitError("nothing moves: a sweep at a speed is needed")

@@ -161,20 +161,20 @@ class _RestPose:
                 turn = sense * coefficients[0]
         low, high = model.jnt_range[leader].tolist()
         limits = (low, high) if model.jnt_limited[leader] else None
-        ground = linkage.ground_angle
-        turned, bearer = (angles[bar - 1] for bar in bars)
+        zero_is_told = 3 in bars or rocker == follower
 
         def see(side: float) -> JointEquality:
             """Describe the equality as it is seen from the tip, +1, or from behind."""
-            zero = side * (turned - bearer) + (ground if bars[1] == 1 else 0.0)
+            _, *theta = linkage.ground_angle + side * np.array(angles)
+            turned, bearer = ([0.0, *theta][bar - 1] for bar in bars)
             return JointEquality(
                 name_joint(model, follower),
                 name_joint(model, leader),
                 coefficients,
                 float(model.qpos0[model.jnt_qposadr[leader]]),
                 sense,
-                ground + side * angles[1],
-                zero if 3 in bars or rocker == follower else math.nan,
+                float(theta[0]),
+                float(turned - bearer) if zero_is_told else math.nan,
                 side,
                 True,
                 bars,
@@ -204,11 +204,15 @@ class _RestPose:
             return 4, 3
         return 3, 4
 
-    def _find_line(self, joint: int, other: int) -> Array:
-        """Return the way between two hinges across the leader's axis, (3,), m."""
+    def _find_line(self, joint: int, other: int) -> tuple[Array, float]:
+        """Return the way between two hinges across the leader's axis, (3,), m.
+
+        Its length comes with it.
+        """
         normal = self.data.xaxis[self.tie.leader]
         line = self.data.xanchor[joint] - self.data.xanchor[other]
-        return np.asarray(line - normal * (normal @ line))
+        line -= normal * (normal @ line)
+        return line, math.hypot(*line)
 
     def _compare_length(self, follower: int, bearer: int) -> str:
         """Say that the hinges of the follower's bearer are not those of the scene."""
@@ -219,7 +223,7 @@ class _RestPose:
             other = model.body_jntadr[body]
         if other < 0:  # it hangs on the world, beside the ground of the scene
             return ""
-        length = float(np.linalg.norm(self._find_line(follower, other)))
+        _, length = self._find_line(follower, other)
         in_scene = self.scene.linkage.lengths[bearer - 1]
         if _is_same_number(length, in_scene):
             return ""
@@ -241,8 +245,7 @@ class _RestPose:
         joints = [follower, *(tie.joint for tie in ties if tie.leader == leader)]
         normal = self.data.xaxis[leader]
         for joint in joints:
-            line = self._find_line(joint, leader)
-            length = float(np.linalg.norm(line))
+            line, length = self._find_line(joint, leader)
             is_ground = _is_same_number(length, self.scene.linkage.lengths[0])
             if is_ground and self._find_bars(joint) == (4, 1):
                 x = line / length
@@ -263,12 +266,18 @@ class _RestPose:
         shown = stated
         if shown is None and scene.drawing is not None:
             shown = scene.drawing.angle(2)
-        theta_2 = command(scene).theta_2
-        moved = (float(theta_2.min()), float(theta_2.max()))
+        meets = False
+        if seen.swing is not None:
+            theta_2 = command(scene).theta_2
+            ranges = np.array([seen.swing, (theta_2.min(), theta_2.max())])
+            first, second = ranges.mean(axis=1)
+            # they share an angle modulo turns
+            apart = abs(math.remainder(first - second, math.tau))
+            meets = bool(apart <= np.ptp(ranges, axis=1).mean())
         return (
             shown is not None and is_same_angle(seen.theta_2, shown),
             is_seen_from_behind(scene, [-seen.side * angle for angle in angles]),
-            seen.swing is not None and _meet(seen.swing, moved),
+            meets,
         )
 
     def _find_angle(self, joint: int, bar: Bar) -> float:
@@ -317,13 +326,6 @@ class _RestPose:
                 middle = data.geom_xpos[number]
                 ends += [middle - reach, middle + reach]
         yield ends
-
-
-def _meet(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Tell whether two ranges (low, high) of an angle, rad, share one modulo turns."""
-    (low, high), (first, last) = one, other
-    apart = math.remainder((low + high - first - last) / 2.0, math.tau)
-    return abs(apart) <= (high - low + last - first) / 2.0
 
 
 def is_same_angle(one: float, other: float) -> bool:

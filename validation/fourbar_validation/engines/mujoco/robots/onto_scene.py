@@ -273,9 +273,11 @@ def close_onto(
 
 def _place(loop: RobotLoop, posed: PosedRobot) -> RobotLoop:
     """Return a loop of a robot in another pose."""
-    placed = LoopFrame(loop, posed.data).place()
-    stated = placed["angles"]
-    return replace(loop, qpos=posed.data.qpos.copy(), stated_angles=stated, **placed)
+    qpos = posed.data.qpos.copy()
+    lengths, angles = LoopFrame(loop, posed.data).measure_bars()
+    return replace(
+        loop, qpos=qpos, lengths=lengths, angles=angles, stated_angles=angles
+    )
 
 
 def _leave_flat(scene: Scene, posed: PosedRobot, loop: RobotLoop) -> Array:

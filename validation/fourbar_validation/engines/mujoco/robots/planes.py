@@ -6,7 +6,7 @@ MuJoCo's arrays: of a body's bearer on it, and of an equality.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from copy import copy
 
 import mujoco
@@ -39,7 +39,7 @@ def find_mean_axis(data: mujoco.MjData, hinges: Iterable[int]) -> Array:
 def find_normals(
     model: mujoco.MjModel,
     data: mujoco.MjData,
-    held: set[int],
+    held: Set[int],
 ) -> dict[int, Array]:
     """Return the normal of the plane of each connect and weld that moves in one, (3,).
 
@@ -121,13 +121,13 @@ def find_bearer_forces(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """
     applied = data.xfrc_applied.copy()
     on_sites = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-    for load in np.flatnonzero(on_sites):
+    for load in np.flatnonzero(on_sites).tolist():
         body = model.site_bodyid[model.actuator_trnid[load, 0]]
         data.xfrc_applied[body, :3] += find_site_load(model, data, load)()
     data.xfrc_applied[:, :3] -= np.outer(list_lifted_masses(model), model.opt.gravity)
     mujoco.mj_rnePostConstraint(model, data)
     data.xfrc_applied[:] = applied
-    return data.cfrc_int[:, 3:].copy()
+    return np.array(data.cfrc_int[:, 3:])
 
 
 def read_equality_force(data: mujoco.MjData, equality: int) -> Array:

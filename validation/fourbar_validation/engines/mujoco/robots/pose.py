@@ -13,7 +13,7 @@ the loops.
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import replace
 from xml.etree import ElementTree as ET
@@ -271,7 +271,10 @@ class PosedRobot:
     """A robot's file, compiled and brought into a pose."""
 
     compiled: CompiledRobot
-    options: PoseOptions
+    held: frozenset[int]
+    """Joints that are fixed where they stand."""
+    drive: int | None
+    """Joint that is driven; None: that of a motor."""
     data: mujoco.MjData
     """State in the pose, closed, positions evaluated."""
     stated: Array
@@ -296,7 +299,10 @@ def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
     compiled = compile_robot(file)
     model = compiled.model
     stated = _choose_start(model, options)
-    held = {find_joint(model, name, "--hold") for name in options.held}
+    held = frozenset(find_joint(model, name, "--hold") for name in options.held)
+    drive = None
+    if options.drive is not None:
+        drive = find_joint(model, options.drive, "--drive")
     fixed = {*held}
     for name, text in options.joints.items():
         joint = find_joint(model, name, "--pose")
@@ -324,7 +330,7 @@ def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
     elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
     data = _evaluate_kinematics(model, closed)
-    return PosedRobot(compiled, options, data, stated, tuple(notes))
+    return PosedRobot(compiled, held, drive, data, stated, tuple(notes))
 
 
 def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:
@@ -427,7 +433,7 @@ class _Closing:
     def __init__(
         self,
         model: mujoco.MjModel,
-        held: set[int],
+        held: frozenset[int],
         equalities: list[int],
         tied: set[int],
     ) -> None:
@@ -454,7 +460,7 @@ class _Closing:
         residuals, _ = self._evaluate(qpos)
         return float(np.abs(residuals).max(initial=0.0))
 
-    def find_pose(self, stated: Array, fixed: set[int], outside: set[int]) -> Array:
+    def find_pose(self, stated: Array, fixed: Set[int], outside: set[int]) -> Array:
         """Return the pose near a stated one in which the loops are closed, (nq,).
 
         Fixed joints stay. `outside`: joints that are outside their ranges.
@@ -473,7 +479,7 @@ class _Closing:
             closed = self.close(closed, fixed)
         return closed
 
-    def list_starts(self, stated: Array, fixed: set[int]) -> Iterator[Array]:
+    def list_starts(self, stated: Array, fixed: Set[int]) -> Iterator[Array]:
         """List poses from which closing may end elsewhere, (nq,).
 
         Each moves one joint: to a quarter, half or three quarters of its range, or a
@@ -493,7 +499,7 @@ class _Closing:
                 start[place] = value
                 yield start
 
-    def close(self, start: Array, fixed: set[int]) -> Array:
+    def close(self, start: Array, fixed: Set[int]) -> Array:
         """Return the pose near `start` of least residuals in the ranges, (nq,).
 
         Fixed joints do not move.

@@ -64,11 +64,10 @@ class LoopFrame:
         """Return the angle of a bar's line, rad."""
         return cmath.phase(self.line(bar))
 
-    def place(self) -> dict[str, tuple[float, ...]]:
-        """Return lengths, m, and angles, rad, of bars 1 to 4, by fields of the loop."""
+    def measure_bars(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return lengths, m, and angles, rad, of bars 1 to 4."""
         lines = [*map(self.line, ENDS)]
-        lengths = tuple(map(abs, lines))
-        return {"lengths": lengths, "angles": tuple(map(cmath.phase, lines))}
+        return tuple(map(abs, lines)), tuple(map(cmath.phase, lines))
 
     def resolve(self, bar: int, vector: Array) -> tuple[float, float]:
         """Resolve a vector of the world along a bar's line and to its left."""
