@@ -127,14 +127,9 @@ def change_scene(scene: Scene, one: Difference) -> Scene | None:
         return None
     change = one.theirs - one.generated
     if one.key in ("gravity.x", "gravity.y"):
-        pull = complex(change) if one.key.endswith("x") else 1j * change
-        others = []
-        for effect in scene.effects:
-            if isinstance(effect, Gravity):
-                pull += complex(*effect.vector)
-            else:
-                others.append(effect)
-        return replace(scene, effects=(*others, Gravity(*cmath.polar(pull))))
+        pull = change if one.key.endswith("x") else 1j * change
+        further = Gravity(*cmath.polar(pull))
+        return replace(scene, effects=(*scene.effects, further))
     linkage = scene.linkage
     crank, coupler, output = (
         Bar(bar.length, bar.mass, bar.moment_of_inertia, bar.mass_centre)

@@ -18,16 +18,11 @@ _CLOSING = (int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD))
 _ON_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
-def find_parent(model: mujoco.MjModel, body: int) -> int:
-    """Return the body that carries another."""
-    return int(model.body_parentid[body])
-
-
 def climb(model: mujoco.MjModel, body: int) -> list[int]:
     """List a body and its ancestors up to the world."""
     bodies = [body]
     while bodies[-1]:
-        bodies.append(find_parent(model, bodies[-1]))
+        bodies.append(int(model.body_parentid[bodies[-1]]))
     return bodies
 
 
@@ -45,7 +40,7 @@ def find_roots(model: mujoco.MjModel, held: set[int]) -> list[int]:
     roots = [0]
     for body in range(1, model.nbody):
         moves = any(joint not in held for joint in list_joints(model, body))
-        roots.append(body if moves else roots[find_parent(model, body)])
+        roots.append(body if moves else roots[model.body_parentid[body]])
     return roots
 
 
@@ -197,12 +192,6 @@ def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
     """Describe an actuator: as the file names it, or by its number."""
     name = model.actuator(actuator).name or f"number {actuator} of the file"
     return f"the actuator {name}"
-
-
-def list_dofs(model: mujoco.MjModel, joint: int) -> list[int]:
-    """List the degrees of freedom of a joint."""
-    dofs: list[int] = np.flatnonzero(model.dof_jntid == joint).tolist()
-    return dofs
 
 
 def list_motors(model: mujoco.MjModel) -> list[int]:

@@ -25,7 +25,6 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_bits,
     find_ends,
     find_named,
-    find_parent,
     find_roots,
     find_tied_bodies,
     list_actuators,
@@ -62,6 +61,7 @@ from fourbar_validation.engines.mujoco.robots.pose import (
     LARGEST_RESIDUAL,
     SLIDE,
     PosedRobot,
+    evaluate_kinematics,
     pose_robot,
 )
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
@@ -261,9 +261,7 @@ class _Finder:
         self.root = find_roots(model, self.held)
         self.chains = {one: _Chain(self, one) for one in list_closing(model)}
         self.normals = find_normals(model, self.data, self.held)
-        self.before = mujoco.MjData(model)
-        self.before.qpos[:] = posed.stated
-        mujoco.mj_kinematics(model, self.before)
+        self.before = evaluate_kinematics(model, posed.stated)
 
     def _is_triangle(self, chain: _Chain) -> bool:
         """Tell whether two parallel hinges, off each other and the closure, stand."""
@@ -277,7 +275,7 @@ class _Finder:
     def join(self, joint: int) -> tuple[int, int]:
         """Return the bar that a joint turns, and the one that bears it."""
         body = int(self.model.jnt_bodyid[joint])
-        return self.root[body], self.root[find_parent(self.model, body)]
+        return self.root[body], self.root[self.model.body_parentid[body]]
 
     def describe(self, number: int) -> RobotClosure:
         """Describe one equality."""
@@ -412,11 +410,10 @@ class _Finder:
         """
         model = self.model
         (ball,) = chain.others
-        rest = mujoco.MjData(model)
-        rest.qpos[:] = self.data.qpos
+        qpos = self.data.qpos.copy()
         of_ball = slice(model.jnt_qposadr[ball], model.jnt_qposadr[ball] + 4)
-        rest.qpos[of_ball] = model.qpos0[of_ball]
-        mujoco.mj_kinematics(model, rest)
+        qpos[of_ball] = model.qpos0[of_ball]
+        rest = evaluate_kinematics(model, qpos)
         # a joint states its axis in the frame of its body
         turn = rest.xmat[model.jnt_bodyid[ball]].reshape(3, 3)
         axis = turn.T @ rest.xaxis[chain.hinges[0]]

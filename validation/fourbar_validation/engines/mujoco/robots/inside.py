@@ -624,10 +624,9 @@ class LoopInside:
         answer = InsideAnswer()
         _, omega, alpha = motion[0].tolist()
         angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
-        instants = _list_instants(angles, omega, alpha, self.model.opt.timestep)
-        self.model.jnt_margin[:] -= (
-            _PASSED * self.model.opt.timestep * np.ptp(angles) / instants[-1]
-        )
+        timestep = self.model.opt.timestep
+        instants = _list_instants(angles, omega, alpha, timestep)
+        self.model.jnt_margin[:] -= _PASSED * timestep * np.ptp(angles) / instants[-1]
         model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
         state = self.state(angles[0], omega)
@@ -644,7 +643,7 @@ class LoopInside:
 
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
-        stepper = Stepper(model, data, model.opt.timestep)
+        stepper = Stepper(model, data, timestep)
         rows: list[Any] = []
         doubtful: list[Any] = []  # they may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far

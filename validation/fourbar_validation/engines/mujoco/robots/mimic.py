@@ -15,7 +15,6 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene, command
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     Follower,
-    find_parent,
     find_roots,
     list_followers,
     name_joint,
@@ -25,6 +24,7 @@ from fourbar_validation.engines.mujoco.robots.loop_scene import is_seen_from_beh
 from fourbar_validation.engines.mujoco.robots.pose import (
     HINGE_JOINT,
     compile_robot,
+    evaluate_kinematics,
     find_joint,
 )
 
@@ -132,8 +132,7 @@ class _RestPose:
                     name_joint(model, joint),
                     "is no hinge: both must be hinges",
                 )
-        self.data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, self.data)
+        self.data = evaluate_kinematics(model, model.qpos0)
         self.roots = find_roots(model, set())
         self.axes = np.zeros((2, 3))
         """x along the ground and y in the plane, (2, 3), once the ground is found."""
@@ -194,13 +193,13 @@ class _RestPose:
         model = self.model
         roots = self.roots
         crank = model.jnt_bodyid[self.tie.leader]
-        ground = roots[find_parent(model, crank)]
-        bearer = roots[find_parent(model, model.jnt_bodyid[follower])]
+        ground = roots[model.body_parentid[crank]]
+        bearer = roots[model.body_parentid[model.jnt_bodyid[follower]]]
         if bearer == crank:
             return 3, 2
         if bearer == ground:
             return 4, 1
-        if roots[find_parent(model, bearer)] == crank:
+        if roots[model.body_parentid[bearer]] == crank:
             return 4, 3
         return 3, 4
 
@@ -219,7 +218,7 @@ class _RestPose:
         model = self.model
         other = self.tie.leader
         if bearer > 1:
-            body = self.roots[find_parent(model, model.jnt_bodyid[follower])]
+            body = self.roots[model.body_parentid[model.jnt_bodyid[follower]]]
             other = model.body_jntadr[body]
         if other < 0:  # it hangs on the world, beside the ground of the scene
             return ""

@@ -27,7 +27,6 @@ from fourbar.quantities import Array
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_named,
     is_enabled,
-    list_dofs,
     list_motors,
     list_tied_joints,
     name_body,
@@ -329,7 +328,7 @@ def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
         notes.append(widest.say_open(options, stated, left))
     elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
-    data = _evaluate_kinematics(model, closed)
+    data = evaluate_kinematics(model, closed)
     return PosedRobot(compiled, held, drive, data, stated, tuple(notes))
 
 
@@ -339,7 +338,7 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
     mujoco.mj_differentiatePos(model, change, 1.0, stated, closed)
     moved = []
     for joint in range(model.njnt):
-        amounts = change[list_dofs(model, joint)]
+        amounts = change[model.dof_jntid == joint]
         shifts = {SLIDE: 1, FREE_JOINT: 3}.get(model.jnt_type[joint], 0)
         parts = []
         for part, factor, unit in (
@@ -356,7 +355,7 @@ def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str
 
 def move_to(posed: PosedRobot, qpos: Array) -> PosedRobot:
     """Return a robot whose loops are closed in another pose."""
-    data = _evaluate_kinematics(posed.model, qpos)
+    data = evaluate_kinematics(posed.model, qpos)
     return replace(posed, data=data, stated=qpos)
 
 
@@ -401,7 +400,8 @@ def _list_bounds(model: mujoco.MjModel) -> tuple[Array, Array]:
     return low, high
 
 
-def _evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
+def evaluate_kinematics(model: mujoco.MjModel, qpos: Array) -> mujoco.MjData:
+    """Return a state in which the positions of bodies are evaluated."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_normalizeQuat(model, data.qpos)
@@ -445,7 +445,7 @@ class _Closing:
         self.held = held
         self.data = mujoco.MjData(self.model)
         self.low, self.high = _list_bounds(model)
-        self.tied = sorted(tied)
+        self.tied = tied
 
     def _evaluate(self, qpos: Array) -> tuple[Array, Array]:
         """Return the equalities' residuals, (m,), and their Jacobian, (m, nv)."""
@@ -465,8 +465,7 @@ class _Closing:
 
         Fixed joints stay. `outside`: joints that are outside their ranges.
         """
-        beyond = (outside - fixed).intersection(self.tied)
-        if self.size(stated) <= CLOSED_IN_THE_FILE and not beyond:
+        if self.size(stated) <= CLOSED_IN_THE_FILE and not outside - fixed & self.tied:
             return stated
         motors = {*list_motors(self.model)} - outside
         closed = self.close(stated, fixed | motors)
@@ -486,7 +485,7 @@ class _Closing:
         hinge without limits by a quarter turn either way, since least squares keep bars
         in line that are so. Fixed joints stay.
         """
-        for joint in sorted({*self.tied} - fixed):
+        for joint in sorted(self.tied - fixed):
             place = self.model.jnt_qposadr[joint]
             values: list[float] = []
             if math.isfinite(self.low[place]):
@@ -508,13 +507,13 @@ class _Closing:
 
         model = self.model
         qpos = start.copy()
-        moving = [joint for joint in self.tied if joint not in fixed]
-        dofs = [dof for joint in moving for dof in list_dofs(model, joint)]
+        moving = [*self.tied - fixed]
+        dofs = np.flatnonzero(np.isin(model.dof_jntid, moving))
         places = model.jnt_qposadr[model.dof_jntid[dofs]]
         low = self.low[places]
         high = self.high[places]
         qpos[places] = np.clip(qpos[places], low, high)
-        if not dofs:
+        if not len(dofs):
             return qpos
         damping = _DAMPING * np.eye(len(dofs))
         for _ in range(MOST_NEWTON_STEPS):

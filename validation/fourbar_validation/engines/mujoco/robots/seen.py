@@ -16,6 +16,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_joints_of_tendon,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import DRIVEN_PINS, RobotLoop
+from fourbar_validation.engines.mujoco.robots.pose import evaluate_kinematics
 
 _PLANES = {2: "x-y", 1: "x-z", 0: "y-z"}
 """Plane of the world by the axis that is normal to it."""
@@ -99,12 +100,7 @@ class SeenLoop(LoopFrame):
         `bar`: the commanded one, whose motors are the drive.
         """
         self.model = model
-        data = mujoco.MjData(model)
-        data.qpos[:] = loop.qpos
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        super().__init__(loop, data)
-        self.commanded = bar
+        super().__init__(loop, evaluate_kinematics(model, loop.qpos))
         driven = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         self.drives = [] if driven is None else list_actuators(model, driven)
         self.hinge = loop.hinges
