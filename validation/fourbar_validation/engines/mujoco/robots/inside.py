@@ -33,6 +33,7 @@ import numpy as np
 
 from fourbar.errors import LimitError
 from fourbar.linkage import ENDS, MOVING_BARS, PINS, Bar, FourBar
+from fourbar.mjcf.document import WindowMotion
 from fourbar.quantities import Array, Signs
 from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import OPEN
@@ -465,7 +466,7 @@ class LoopInside:
             rigid,
             self._measure_gap(qpos),
             self._read_bars(data),
-            abs(self.measure_sine(closed.qpos)),
+            self.measure_sine(closed.qpos),
         )
         return record_states([row])[0]
 
@@ -625,7 +626,14 @@ class LoopInside:
         _, omega, alpha = motion[0].tolist()
         angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
         timestep = self.model.opt.timestep
-        instants = _list_instants(angles, omega, alpha, timestep)
+        run = WindowMotion(angles[0], angles[-1], omega, alpha)
+        instants = [*map(run.time, angles)]
+        steps = instants[-1] / timestep
+        if not 1.0 <= steps <= MOST_TIMESTEPS:
+            raise LimitError(
+                f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
+                f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
+            )
         self.model.jnt_margin[:] -= _PASSED * timestep * np.ptp(angles) / instants[-1]
         model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
@@ -645,7 +653,7 @@ class LoopInside:
         drive(self.ask(state.qpos, state.qvel, alpha))
         stepper = Stepper(model, data, timestep)
         rows: list[Any] = []
-        doubtful: list[Any] = []  # they may be in the other assembly
+        doubtful = 0  # number of the last rows that may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far
         # as it does
         answer.settling = min(SETTLING_TIME * self.find_constant(), 0.5 * instants[-1])
@@ -667,8 +675,13 @@ class LoopInside:
             row = self.ask(data.qpos, data.qvel, float(self.turn @ data.qacc))
             rows.append(row)
             drive(row)
-            answer.other_assembly = self._leave_assembly(rows, doubtful, data.qpos)
-            if answer.other_assembly is not None:
+            first, second = (row.bars[f"theta_{bar}"] for bar in FOLLOWING[self.bar])
+            sine = math.sin(second - first)
+            doubtful = doubtful + 1 if sine * row.sine <= 0.0 else 0
+            # beside a change point a loop that has yielded is in no assembly
+            if doubtful and min(abs(sine), abs(row.sine)) > _SINE_OF_AN_ASSEMBLY:
+                answer.other_assembly = float(rows[-doubtful].joint)
+                del rows[-doubtful:]
                 break
         if answer.other_assembly is not None and not rows:
             raise LimitError(OTHER_ASSEMBLY)
@@ -687,26 +700,6 @@ class LoopInside:
             model.body_inertia[self.loop.bodies[self.bar][0]] += armature
         return model, armature
 
-    def _leave_assembly(
-        self, rows: list[Any], doubtful: list[Any], qpos: Array
-    ) -> float | None:
-        """Drop the last rows if they are in the other assembly.
-
-        Return the joint's position at the first of them, rad, else None. Beside a
-        change point, where a loop that has yielded is in neither, the rows before tell.
-        """
-        row = rows[-1]
-        closed = self.close(row.angle)
-        assert closed is not None  # the row was evaluated there
-        now, due = (self.measure_sine(pose) for pose in (qpos, closed))
-        if now * due > 0.0:
-            doubtful.clear()
-            return None
-        doubtful.append(row)
-        if min(abs(now), abs(due)) <= _SINE_OF_AN_ASSEMBLY:
-            return None
-        del rows[-len(doubtful) :]
-        return float(doubtful[0].joint)
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""
@@ -779,27 +772,3 @@ def _measure_drift(data: mujoco.MjData, speeds: Array) -> Array:
 def _has_warned(data: mujoco.MjData) -> bool:
     """Tell whether MuJoCo has warned that it loses the motion."""
     return any(data.warning[kind].number for kind in WARNINGS)
-
-
-def _list_instants(
-    angles: list[float], omega: float, alpha: float, timestep: float
-) -> list[float]:
-    """List the times at which a motion passes angles, the first at 0, s.
-
-    Raises LimitError if it comes to rest before, or takes too few steps or too many.
-    """
-    instants = []
-    for angle in angles:
-        turned = angle - angles[0]
-        squared = omega**2 + 2.0 * alpha * turned
-        if squared <= 0.0:
-            raise LimitError(f"alpha_2 brings the input to rest before {angle:.6g} rad")
-        speed = math.copysign(math.sqrt(squared), omega)
-        instants.append(2.0 * turned / (omega + speed))
-    steps = instants[-1] / timestep
-    if not 1.0 <= steps <= MOST_TIMESTEPS:
-        raise LimitError(
-            f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
-            f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
-        )
-    return instants

@@ -297,7 +297,7 @@ STATE = np.dtype(
         ("rigid", _FORCES),
         ("gap", float),
         ("bars", [(name, float) for name in MOTION_OF_BARS]),
-        ("condition", float),
+        ("sine", float),
     ]
 )
 """One state of a loop in its robot.
@@ -306,8 +306,8 @@ Angle, speed and acceleration are those of the commanded bar, rad, and the joint
 position of the driven one as the file counts it, rad. Soft are torque and pin forces as
 MuJoCo has them, rigid those with rigid pins at the closed state of the same command.
 The gap is the distance of the ends of the closure, m, and the bars are those of the
-state that MuJoCo evaluates. The condition is |sin| of the angle between the bars that
-follow in that closed state.
+state that MuJoCo evaluates. The sine is that of the angle from the first bar that
+follows to the second in that closed state.
 """
 
 
@@ -417,7 +417,7 @@ class InsideAnswer:
 
     def scales(self, lever: float) -> Array:
         """Return what errors are divided by, from rigid pins, as `find_scales` does."""
-        return find_scales(self.sizes(), self.rows.condition, lever)
+        return find_scales(self.sizes(), np.abs(self.rows.sine), lever)
 
     def find_worst(self, scales: Array) -> WorstState:
         """Return the state of the worst error of torque and pin forces over its scale.
