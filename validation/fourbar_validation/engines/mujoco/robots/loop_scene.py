@@ -17,10 +17,9 @@ import numpy as np
 from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
-    ANGLE_FROM_LIMITS,
     DIGITS_STATED,
+    choose_range,
     count_equalities,
-    find_intervals,
     list_met_equalities,
     meet_change_points,
     turns_fully,
@@ -450,7 +449,12 @@ class SceneOfLoop(SeenLoop):
         first of them, rad.
         """
         theta_2 = self.loop.angles[1]
-        low, high = closing = _find_assembling(self.inside.linkage, theta_2)
+        linkage = self.inside.linkage
+        closing = np.array([-math.inf, math.inf])
+        if not turns_fully(linkage):
+            closing = np.array(choose_range(linkage, holding=theta_2))
+            closing += math.tau * round((theta_2 - closing.mean()) / math.tau)
+        low, high = closing.tolist()
         if stops := self.stops("O2"):
             low = max(low, stops[0] + self.loop.angles[0])
             high = min(high, stops[1] + self.loop.angles[0])
@@ -463,7 +467,7 @@ class SceneOfLoop(SeenLoop):
         theta = self.inside.turn_bars(angles)
         if np.isnan(theta[in_pose]).any():
             posed = self.loop.qpos[self.model.jnt_qposadr[self.hinge["O2"]]]
-            ends = posed + self.sense["O2"] * (np.array(closing) - theta_2)
+            ends = posed + self.sense["O2"] * (closing - theta_2)
             ends = np.sort(np.degrees(ends))
             raise InputError(
                 "MJCF",
@@ -582,23 +586,6 @@ class SceneOfLoop(SeenLoop):
                 or (pulls and self.touches_tendon(target))
             ):
                 self._leave_out(describe_actuator(model, number))
-
-
-def _find_assembling(linkage: FourBar, theta_2: float) -> tuple[float, float]:
-    """Return the range of theta_2 around a position in which the loop assembles.
-
-    The ends are a little inside the limit positions.
-    """
-    if turns_fully(linkage):
-        return -math.inf, math.inf
-    ranges = []
-    for first, last in find_intervals(linkage):
-        half = 0.5 * (last - first)
-        away = math.remainder(theta_2 - first - half, math.tau)
-        ranges.append((abs(away) - half, theta_2 - away, half))
-    _, middle, half = min(ranges)
-    half -= min(ANGLE_FROM_LIMITS, 0.5 * half)
-    return middle - half, middle + half
 
 
 def find_rounding(vector: Iterable[float]) -> float:
