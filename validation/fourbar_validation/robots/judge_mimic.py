@@ -252,12 +252,10 @@ def _follow(
                 )
         raise InputError("motion.theta_2", f"{angle:.6g} deg", reason)
     still = np.zeros_like(theta_2)
-    theta = [still, theta_2, solution.theta_3, solution.theta_4]
-    omega = [still, still + 1.0, solution.omega_3, solution.omega_4]
+    theta = np.array([still, theta_2, solution.theta_3, solution.theta_4])
+    omega = np.array([still, still + 1.0, solution.omega_3, solution.omega_4])
     turned, bearer = (bar - 1 for bar in equality.bars)
-    turn = np.asarray(theta[turned]) - np.asarray(theta[bearer])
-    ratio = np.asarray(omega[turned]) - np.asarray(omega[bearer])
-    return np.unwrap(turn), ratio
+    return np.unwrap(theta[turned] - theta[bearer]), omega[turned] - omega[bearer]
 
 
 def fit_minimax(x: Array, y: Array, degree: int) -> Polynomial:

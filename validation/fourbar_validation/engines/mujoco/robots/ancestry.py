@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import InputError
 from fourbar.quantities import Array
@@ -197,7 +198,7 @@ def describe_actuator(model: mujoco.MjModel, actuator: int) -> str:
 def list_motors(model: mujoco.MjModel) -> list[int]:
     """List the joints that what takes a control acts on, a joint for each motor."""
     motors = []
-    for number in filter(lambda one: takes_control(model, one), range(model.nu)):
+    for number in np.flatnonzero(take_control(model)):
         kind = model.actuator_trntype[number]
         target = int(model.actuator_trnid[number, 0])
         if kind in _ON_JOINTS:
@@ -215,9 +216,9 @@ def list_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
     return actuators
 
 
-def takes_control(model: mujoco.MjModel, actuator: int) -> bool:
-    """Tell a motor from a load, a spring or a damper that is written as an actuator."""
-    return bool(model.actuator_gainprm[actuator].any())
+def take_control(model: mujoco.MjModel) -> NDArray[np.bool_]:
+    """Tell motors from loads, springs and dampers that are actuators, (nu,)."""
+    return np.asarray(model.actuator_gainprm.any(axis=1))
 
 
 def find_bits(*flags: str) -> int:

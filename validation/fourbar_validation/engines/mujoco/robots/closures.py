@@ -36,7 +36,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_body,
     name_joint,
     name_part,
-    takes_control,
+    take_control,
 )
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
@@ -607,12 +607,8 @@ class _Finder:
         places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
         mujoco.mju_sparse2dense(pulls, data.actuator_moment, *places)
         dofs = model.jnt_dofadr[chain.joints]
-        pulling = np.flatnonzero(pulls[:, dofs].any(axis=1)).tolist()
-        return ", ".join(
-            describe_actuator(model, one)
-            for one in pulling
-            if takes_control(model, one)
-        )
+        pulling = np.flatnonzero(pulls[:, dofs].any(axis=1) & take_control(model))
+        return ", ".join(describe_actuator(model, one) for one in pulling.tolist())
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.

@@ -10,7 +10,7 @@ from fourbar.effects.place import Place
 from fourbar.linkage import FIRST_PIN
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps
+from fourbar_validation.engines.mujoco.robots.ancestry import list_wraps, take_control
 from fourbar_validation.engines.mujoco.robots.loop_facts import RobotLoop
 from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 
@@ -37,8 +37,8 @@ class LoopDrive:
         """Actuator of the file between two sites that drives, if it has exactly one."""
         if isinstance(self.force, LinearDrive):
             on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
-            controlled = model.actuator_gainprm.any(axis=1)
-            self.cylinders = np.flatnonzero(on_tendons & controlled).tolist()
+            motors = np.flatnonzero(on_tendons & take_control(model))
+            self.cylinders = motors.tolist()
         tendons = model.actuator_trnid[self.cylinders, 0].tolist()
         wraps = [wrap for tendon in tendons for wrap in list_wraps(model, tendon)]
         self.sites = [site for kind, site, _ in wraps if kind == _SITE]

@@ -47,7 +47,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_actuators,
     name_joint,
-    takes_control,
+    take_control,
 )
 from fourbar_validation.engines.mujoco.robots.drive import LoopDrive
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
@@ -222,7 +222,7 @@ class LoopInside:
             model.jnt_margin[:] -= _TOUCHED
         else:
             model.opt.disableflags |= LIMITS_OFF | find_bits("contact")
-            off = [*off, *(i for i in range(model.nu) if takes_control(model, i))]
+            off = [*off, *np.flatnonzero(take_control(model))]
         off = [*off, *self.drive.cylinders]
         model.actuator_gainprm[off] = 0.0
         model.actuator_biasprm[off] = 0.0
@@ -617,27 +617,14 @@ class LoopInside:
         inertia. The couple that a state asks for acts on the bar until the next, so
         that its speed is kept.
         """
-        if varies(motion):
-            raise LimitError(
-                "omega or alpha differs from position to position: that is no one"
-                " motion through time"
-            )
         answer = InsideAnswer()
+        start, instants = self._list_instants(motion)
         _, omega, alpha = motion[0].tolist()
-        angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
-        timestep = self.model.opt.timestep
-        run = WindowMotion(angles[0], angles[-1], omega, alpha)
-        instants = [*map(run.time, angles)]
-        steps = instants[-1] / timestep
-        if not 1.0 <= steps <= MOST_TIMESTEPS:
-            raise LimitError(
-                f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
-                f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
-            )
-        self.model.jnt_margin[:] -= _PASSED * timestep * np.ptp(angles) / instants[-1]
+        speed = np.ptp(motion[:, 0]) / instants[-1]
+        self.model.jnt_margin[:] -= _PASSED * self.model.opt.timestep * speed
         model, armature = self._keep_speeds()
         data = mujoco.MjData(self.model)
-        state = self.state(angles[0], omega)
+        state = self.state(start, omega)
         if state is None:
             raise LimitError("the loop does not close where the motion starts")
         data.qpos[:] = state.qpos
@@ -651,7 +638,7 @@ class LoopInside:
 
         mujoco.mj_forward(self.model, data)
         drive(self.ask(state.qpos, state.qvel, alpha))
-        stepper = Stepper(model, data, timestep)
+        stepper = Stepper(model, data, model.opt.timestep)
         rows: list[Any] = []
         doubtful = 0  # number of the last rows that may be in the other assembly
         # the loop starts exactly closed, and takes some time constants to yield as far
@@ -688,6 +675,28 @@ class LoopInside:
         answer.rows = record_states(rows)
         return answer
 
+    def _list_instants(self, motion: Array) -> tuple[float, list[float]]:
+        """Return the angle at which a motion starts, rad, and when its angles pass, s.
+
+        Raises LimitError for speeds of each position, or for too few steps or too many.
+        """
+        if varies(motion):
+            raise LimitError(
+                "omega or alpha differs from position to position: that is no one"
+                " motion through time"
+            )
+        _, omega, alpha = motion[0].tolist()
+        start, *_, stop = angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
+        instants = [*map(WindowMotion(start, stop, omega, alpha).time, angles)]
+        timestep = self.model.opt.timestep
+        steps = instants[-1] / timestep
+        if not 1.0 <= steps <= MOST_TIMESTEPS:
+            raise LimitError(
+                f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
+                f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
+            )
+        return start, instants
+
     def _keep_speeds(self) -> tuple[mujoco.MjModel, float]:
         """Return a model whose armatures keep speeds, and that of the commanded bar."""
         model, armature = self._hold_others()
@@ -699,7 +708,6 @@ class LoopInside:
             # about its own centre alone, and alike about every axis: it turns no other
             model.body_inertia[self.loop.bodies[self.bar][0]] += armature
         return model, armature
-
 
     def find_constant(self) -> float:
         """Return the time constant of the closure, s."""

@@ -40,7 +40,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_lifted_masses,
     name_body,
     name_joint,
-    takes_control,
+    take_control,
 )
 from fourbar_validation.engines.mujoco.robots.closures import (
     describe_equality,
@@ -579,7 +579,7 @@ class SceneOfLoop(SeenLoop):
             on_joint = kind == mujoco.mjtTrn.mjTRN_JOINT and target in joints
             on_site = kind == mujoco.mjtTrn.mjTRN_SITE
             on_tendon = kind == mujoco.mjtTrn.mjTRN_TENDON
-            pulls = on_tendon and not takes_control(model, number)
+            pulls = on_tendon and not take_control(model)[number]
             if (
                 on_joint
                 or (on_site and model.site_bodyid[target] in self.bodies)

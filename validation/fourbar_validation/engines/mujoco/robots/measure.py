@@ -23,7 +23,7 @@ from fourbar.mjcf import write_mjcf
 from fourbar.mjcf.document import Drive
 from fourbar.quantities import OK, Array
 from fourbar.scene import Scene, command, find_signs
-from fourbar.scene.motion import CROSSED, OPEN, Motion
+from fourbar.scene.motion import Motion
 from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import magnitude, wrap_difference
 from fourbar_validation.engines.description import Value, name_driving
@@ -342,13 +342,12 @@ def _generate(scene: Scene) -> RobotFile:
     varies = any(rate is not None and np.ptp(rate) for rate in rates)
     if varies or commanded.bar != 2 or scene.motion.stroke is not None:
         solution = solve(scene, "position")
-        closed = np.flatnonzero(solution.status_code == OK)
+        closed = np.flatnonzero(solution.status_code == OK)[:1]
         if not len(closed):
             raise LimitError("the scene's loop closes at none of its positions")
-        moving = (solution.theta_2, solution.theta_3, solution.theta_4)
-        theta_2, theta_3, theta_4 = np.array(moving)[:, closed[:1]]
-        sign = np.where(np.sin(theta_4 - theta_3) > 0.0, OPEN, CROSSED)
-        (branch,) = find_signs(scene.linkage, theta_2, sign).tolist()
+        theta_2 = np.asarray(solution.theta_2)[closed]
+        signs = np.asarray(solution.branch)[closed]
+        (branch,) = find_signs(scene.linkage, theta_2, signs).tolist()
         scene = replace(scene, motion=Motion(float(theta_2[0]), branch=branch))
         drive = "none"
     return RobotFile(GENERATED, write_mjcf(scene, drive=drive))

@@ -261,7 +261,7 @@ def close_onto(
             f" and the scene names the {wanted} one (seen so that gravity points as in"
             " the scene)"
         )
-        before, after = find_circuits(scene, [seen.angles, moved.angles])
+        before, after = (_find_circuit(scene, way.angles) for way in (seen, moved))
         if reflected is None or before != after:
             advice = "state a pose of that one"
             if other_pose := write_pose(posed.model, seen, reflected):
@@ -310,16 +310,15 @@ def _fits_gravity(
     return abs(pull / abs(pull) - wanted / abs(wanted)) <= _SAME_DIRECTION
 
 
-def find_circuits(scene: Scene, angles: Sequence[Sequence[float]]) -> list[int]:
-    """Return the circuits of a scene's linkage in which a loop stands, (n,).
+def _find_circuit(scene: Scene, angles: Sequence[float]) -> int:
+    """Return the circuit of a scene's linkage in which a loop stands.
 
-    `angles`: theta_1 to theta_4 of the loop, (n, 4), rad.
+    `angles`: theta_1 to theta_4 of the loop, rad.
     """
-    theta_1, theta_2, theta_3, theta_4 = np.transpose(angles)
-    branches = np.where(np.sin(theta_4 - theta_3) > 0.0, OPEN, CROSSED).astype(np.int8)
-    angle = theta_2 - theta_1 + scene.linkage.ground_angle
-    circuits: list[int] = find_circuit(scene.linkage, angle, branches).tolist()
-    return circuits
+    theta_1, theta_2, theta_3, theta_4 = angles
+    branch = OPEN if math.sin(theta_4 - theta_3) > 0.0 else CROSSED
+    angle = np.array([theta_2 - theta_1 + scene.linkage.ground_angle])
+    return int(find_circuit(scene.linkage, angle, branch)[0])
 
 
 def turn(loop: RobotLoop, scene: Scene) -> RobotLoop:

@@ -419,10 +419,11 @@ def _list_groups(model: mujoco.MjModel) -> list[tuple[list[int], set[int]]]:
     for number in np.flatnonzero(model.eq_active0).tolist():
         numbers = [number]
         joints = list_tied_joints(model, number)
-        for group in [one for one in groups if one[1] & joints]:
-            groups.remove(group)
-            numbers += group[0]
-            joints |= group[1]
+        for group in [*groups]:
+            if group[1] & joints:
+                groups.remove(group)
+                numbers += group[0]
+                joints |= group[1]
         groups.append((numbers, joints))
     return groups
 
