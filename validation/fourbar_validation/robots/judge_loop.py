@@ -34,6 +34,7 @@ from fourbar_validation.engines.description import list_unknowns
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     HIDING,
     MOTION_OF_BARS,
+    OTHER_ASSEMBLY,
     SETTINGS_OF_AN_SDF,
     InsideAnswer,
     LoopMeasurement,
@@ -254,8 +255,10 @@ def list_rows(
     """
     answers = list_answers(measured)
     rows = judge_answers(name, measured, answers, tolerance, softness)
-    reason = "" if measured.through_time is None else measured.through_time.lost
-    if measured.left_assembly and not change_points(measured.scene.linkage, 2):
+    through = measured.through_time or InsideAnswer()
+    reason = through.lost
+    left = through.other_assembly is not None or measured.refusal == OTHER_ASSEMBLY
+    if left and not change_points(measured.scene.linkage, 2):
         reason = "the simulation goes over to the other assembly"
     if reason:
         who = (name, FILE_THROUGH_TIME, "-")
@@ -334,7 +337,8 @@ def list_answers(measured: LoopMeasurement) -> list[Answer]:
     if through is not None:
         if len(through.rows):
             answers.append(_make_answer(measured, through, *simulated))
-    elif measured.moves:
+    elif states.rows.speed.any() and len(states.rows) + len(states.open) > 1:
+        # the scene names a motion and not a few states at rest
         answers.append(Answer(*simulated, refusal=measured.refusal))
     return answers
 

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import InputError
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Mask
 
 EQUALITY_KINDS = {
     int(getattr(mujoco.mjtEq, f"mjEQ_{name.upper()}")): name
@@ -208,15 +207,15 @@ def list_motors(model: mujoco.MjModel) -> list[int]:
     return motors
 
 
-def list_actuators(model: mujoco.MjModel, joint: int) -> list[int]:
-    """List the actuators on a joint."""
+def list_actuators(model: mujoco.MjModel, joint: int | None) -> list[int]:
+    """List the actuators on a joint; none on no joint."""
     of_joints = np.isin(model.actuator_trntype, _ON_JOINTS)
     on_this = model.actuator_trnid[:, 0] == joint
     actuators: list[int] = np.flatnonzero(of_joints & on_this).tolist()
     return actuators
 
 
-def take_control(model: mujoco.MjModel) -> NDArray[np.bool_]:
+def take_control(model: mujoco.MjModel) -> Mask:
     """Tell motors from loads, springs and dampers that are actuators, (nu,)."""
     return np.asarray(model.actuator_gainprm.any(axis=1))
 

@@ -72,8 +72,7 @@ COINCIDENT_PINS = 1e-6
 """Two pins are one where they are nearer than this part of the longest bar."""
 LEVEL_PLANE = 1e-6
 """Part of gravity below which a plane is level."""
-_TIED = {"connect": "body", "weld": "body"}
-"""What an equality ties, where its kind does not say it."""
+
 JOINT_WORDS = {FREE_JOINT: "free", BALL: "ball", SLIDE: "slide"}
 NAMES_OF_LINKAGES = {6: "a six-bar", 8: "an eight-bar"}
 _SERVE_SPATIAL = "MuJoCo or Drake serve it, Pinocchio its inverse dynamics"
@@ -158,8 +157,8 @@ def describe_equality(model: mujoco.MjModel, number: int) -> str:
     if kind is None:
         return f"equality {number}"
     tied = [one for one in find_tied_bodies(model, number) if one >= 0]
-    names = [name_part(model, _TIED.get(kind, kind), one) for one in tied]
-    return "-".join(names)
+    part = kind if kind in ("joint", "tendon") else "body"
+    return "-".join(name_part(model, part, one) for one in tied)
 
 
 class _NoFourBarError(Exception):

@@ -173,7 +173,7 @@ class LoopInside:
         self.model = copy(model)
         self.joint = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
         """Hinge between the ground and the commanded bar, if the file has one."""
-        self.taken_off = [] if self.joint is None else list_actuators(model, self.joint)
+        self.taken_off = list_actuators(model, self.joint)
         """Actuators on that hinge."""
         self._switch_off()
         self.data = mujoco.MjData(self.model)

@@ -535,13 +535,6 @@ class LoopMeasurement:
     described: Mapping[str, ModelEntry]
     """Entries of the model by their keys. Stops that ended no state are none."""
 
-    @property
-    def left_assembly(self) -> bool:
-        """Tell whether the simulation went over to the other assembly."""
-        through = self.through_time
-        left = through is not None and through.other_assembly is not None
-        return left or self.refusal == OTHER_ASSEMBLY
-
     def command(self, answer: InsideAnswer) -> Command:
         """Return the command of an answer.
 
@@ -576,12 +569,6 @@ class LoopMeasurement:
         names = list_unknowns(self.scene, FORCE_QUANTITIES)
         scales = zip(names, self.scales.tolist(), strict=True)
         return dict(compress(scales, vanishes))
-
-    @property
-    def moves(self) -> bool:
-        """Tell whether the scene names a motion and not a few states at rest."""
-        speeds = self.states.rows.speed
-        return bool(speeds.any()) and len(speeds) + len(self.states.open) > 1
 
 
 @record

@@ -215,7 +215,7 @@ class SceneOfLoop(SeenLoop):
 
     def __init__(self, posed: PosedRobot, loop: RobotLoop) -> None:
         super().__init__(posed.model, loop)
-        self.compiled = posed.compiled
+        self.robot = posed
         self.remarks: list[str] = []
         self.shift = 0.0
         """Whole turns by which theta_2 of the scene exceeds that of the loop, rad."""
@@ -225,7 +225,7 @@ class SceneOfLoop(SeenLoop):
 
     def require_masses(self) -> None:
         """Refuse a bar of unknown mass, and say which parts of bars have none."""
-        parts = list_unknown_parts(self.compiled, self.bodies)
+        parts = list_unknown_parts(self.robot, self.bodies)
         if parts:
             self._leave_out(f"the mass of {', '.join(parts)}, whose mesh is missing")
 
@@ -351,7 +351,7 @@ class SceneOfLoop(SeenLoop):
         places += [model.jnt_pos[joint] for joint in self.hinge.values()]
         for body in {*climb(model, first)} ^ {*climb(model, second)}:
             places.append(model.body_pos[body])
-            turned = find_rounding(self.compiled.quaternions.get(body, ()))
+            turned = find_rounding(self.robot.quaternions.get(body, ()))
             yield _TURN_OF_A_QUATERNION * longest * turned
         yield from map(find_rounding, places)
 

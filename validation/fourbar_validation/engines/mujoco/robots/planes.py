@@ -12,7 +12,7 @@ from copy import copy
 import mujoco
 import numpy as np
 
-from fourbar.quantities import Array
+from fourbar.quantities import Array, Indices
 from fourbar_validation.engines.mujoco.closed_loop import find_site_load
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_bits,
@@ -74,16 +74,13 @@ def evaluate_closures(
     ----------
     normals : of the plane of each equality that has one, by its number.
     """
-    shape = (data.ne, model.nv)
-    residual = data.efc_pos[: data.ne].copy()
-    jacobian = data.efc_J[: math.prod(shape)].reshape(shape).copy()
+    jacobian = data.efc_J.reshape(-1, model.nv)[: data.ne]
+    values = np.column_stack([data.efc_pos[: data.ne], jacobian])
     for number, normal in normals.items():
-        rows = np.flatnonzero(data.efc_id[: data.ne] == number)
+        rows = _find_rows(data, number)
         if not len(rows):  # it is switched off
             continue
-        along = np.outer(normal, normal)
-        for values in (residual, jacobian):
-            values[rows[:3]] -= along @ values[rows[:3]]
+        values[rows[:3]] -= np.outer(normal, normal) @ values[rows[:3]]
         if len(rows) == len(normal):
             continue
         # MuJoCo states the turn of a weld in the axes of its second body or site
@@ -91,9 +88,13 @@ def evaluate_closures(
         by_sites = model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE
         axes = data.site_xmat[second] if by_sites else data.xmat[second]
         turned = axes.reshape(3, 3).T @ normal
-        for values in (residual, jacobian):
-            values[rows[3:]] = np.outer(turned, turned) @ values[rows[3:]]
-    return residual, jacobian
+        values[rows[3:]] = np.outer(turned, turned) @ values[rows[3:]]
+    return values[:, 0], values[:, 1:]
+
+
+def _find_rows(data: mujoco.MjData, equality: int) -> Indices:
+    """Return the rows of an equality in MuJoCo's arrays; none if it is switched off."""
+    return np.flatnonzero(data.efc_id[: data.ne] == equality)
 
 
 def copy_for_closures(
@@ -135,9 +136,5 @@ def read_equality_force(data: mujoco.MjData, equality: int) -> Array:
 
     An equality that is switched off has no rows: its force is NaN.
     """
-    kinds = data.efc_type[: data.nefc]
-    of_equalities = kinds == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    rows = np.flatnonzero(of_equalities & (data.efc_id[: data.nefc] == equality))
-    if not len(rows):
-        return np.full(3, np.nan)
-    return np.asarray(data.efc_force[rows[:3]])
+    rows = _find_rows(data, equality)
+    return np.array(data.efc_force[rows[:3]]) if len(rows) else np.full(3, np.nan)

@@ -266,10 +266,9 @@ OUTSIDE_A_RANGE = 1e-6
 
 
 @record
-class PosedRobot:
-    """A robot's file, compiled and brought into a pose."""
+class PosedRobot(CompiledRobot):
+    """A compiled robot in a pose; the notes say too what was done for the pose."""
 
-    compiled: CompiledRobot
     held: frozenset[int]
     """Joints that are fixed where they stand."""
     drive: int | None
@@ -278,13 +277,6 @@ class PosedRobot:
     """State in the pose, closed, positions evaluated."""
     stated: Array
     """Joint positions before the loops were closed, (nq,)."""
-    notes: tuple[str, ...]
-    """Sentences on what was done to the file and its pose."""
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """Compiled model."""
-        return self.compiled.model
 
 
 def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
@@ -329,7 +321,16 @@ def pose_robot(file: RobotFile, options: PoseOptions) -> PosedRobot:
     elif moved := _list_moved(model, stated, closed):
         notes.append(f"the loops are closed again by least squares: {', '.join(moved)}")
     data = evaluate_kinematics(model, closed)
-    return PosedRobot(compiled, held, drive, data, stated, tuple(notes))
+    return PosedRobot(
+        model,
+        tuple(notes),
+        compiled.unknown_masses,
+        compiled.quaternions,
+        held,
+        drive,
+        data,
+        stated,
+    )
 
 
 def _list_moved(model: mujoco.MjModel, stated: Array, closed: Array) -> list[str]:

@@ -102,7 +102,7 @@ class SeenLoop(LoopFrame):
         self.model = model
         super().__init__(loop, evaluate_kinematics(model, loop.qpos))
         driven = loop.hinges.get(DRIVEN_PINS.get(bar, ""))
-        self.drives = [] if driven is None else list_actuators(model, driven)
+        self.drives = list_actuators(model, driven)
         self.hinge = loop.hinges
         self.pins = {joint: pin for pin, joint in loop.hinges.items()}
         self.sense = loop.senses
