@@ -49,10 +49,6 @@ _REMARKS = tomllib.loads(
 """Part of a key, and what a difference there does; the first that fits."""
 
 
-_Errors = dict[tuple[str, str], float]
-"""Errors by method and quantity."""
-
-
 @record
 class Difference:
     """One entry that is not the same in both files, and its cost."""
@@ -170,8 +166,8 @@ def price(
     return replace(difference, cost=max(cost, 0.0), quantity=quantity)
 
 
-def _collect_errors(rows: Sequence[Row]) -> _Errors:
-    """Collect the error of the torque and of each pin force, by method.
+def _collect_errors(rows: Sequence[Row]) -> dict[tuple[str, str], float]:
+    """Collect the errors of the torque and of pin forces by method and quantity.
 
     An error is infinite if there is no answer.
     """

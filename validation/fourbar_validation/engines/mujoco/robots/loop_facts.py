@@ -126,7 +126,7 @@ class RobotLoop:
     ground: str
     """Name of the body that carries both branches of the loop: part of bar 1."""
     hinges: Mapping[str, int]
-    """Joint of each pin that is a hinge."""
+    """Joint of each pin that is a hinge, in the order of PINS."""
     senses: Mapping[str, float]
     """+1 where the joint's angle grows as the second bar of the pin turns
     counter-clockwise against the first; else -1."""

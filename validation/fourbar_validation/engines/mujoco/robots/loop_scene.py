@@ -387,7 +387,7 @@ class SceneOfLoop(SeenLoop):
         pull = self._pull
         if abs(pull) > ROUND_OFF_OF_LOADS * math.hypot(*self.gravity):
             yield Gravity(round_off(abs(pull)), _round_angle(cmath.phase(pull)))
-        hinges = {pin: self.loop.hinges[pin] for pin in PINS if pin in self.loop.hinges}
+        hinges = self.loop.hinges
         damping = [_reflect(model, joint, "damping") for joint in hinges.values()]
         couples = model.dof_frictionloss[model.jnt_dofadr[[*hinges.values()]]]
         couples = couples * is_enabled(model, "frictionloss", "constraint")
@@ -395,13 +395,13 @@ class SceneOfLoop(SeenLoop):
             at_pins = zip(hinges, map(round_off, sizes), strict=True)
             if any(sizes):
                 yield make(tuple((pin, size) for pin, size in at_pins if size))
-        if springs := tuple(self._list_springs(hinges, at_start)):
+        if springs := tuple(self._list_springs(at_start)):
             yield Torsion(springs)
         if armature.get("O2"):
             yield Flywheel(round_off(armature["O2"]), 2)
 
     def _list_springs(
-        self, hinges: dict[str, int], at_start: list[float]
+        self, at_start: list[float]
     ) -> Iterator[tuple[str, float, float, float]]:
         """List pin, stiffness, rest angle and preload of the hinges' springs.
 
@@ -411,7 +411,7 @@ class SceneOfLoop(SeenLoop):
         model = self.model
         if not is_enabled(model, "spring"):
             return
-        for pin, joint in hinges.items():
+        for pin, joint in self.loop.hinges.items():
             stiffness = float(model.jnt_stiffness[joint])
             if not stiffness:
                 continue

@@ -11,7 +11,6 @@ from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from copy import copy
-from functools import partial
 from itertools import chain, compress, islice, product
 from xml.etree import ElementTree as ET
 
@@ -119,8 +118,8 @@ class SettingsSearch:
         for name in _OPTIONS:
             value = getattr(model.opt, name)
             is_word = name in ENUMERATIONS
-            write = partial(word_of_number, name) if is_word else write_six_digits
-            self.own[name] = write(value)
+            text = word_of_number(name, value) if is_word else write_six_digits(value)
+            self.own[name] = text
         looser = (
             self.own["solver"] != SOLVER["solver"],
             model.opt.iterations < int(SOLVER["iterations"]),
