@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, record
 from fourbar.quantities import PIN_FORCES, Array
@@ -201,8 +200,11 @@ class RobotLoop:
 
     def turn(self, angle: float) -> "RobotLoop":
         """Return the loop in axes that are turned by an angle in its plane, rad."""
-        axes = Rotation.from_rotvec([0.0, 0.0, -angle]).as_matrix() @ self.axes
-        return replace(self, axes=axes, angles=tuple(np.array(self.angles) - angle))
+        cos = math.cos(angle)
+        sin = math.sin(angle)
+        turned = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        angles = tuple(np.array(self.angles) - angle)
+        return replace(self, axes=turned @ self.axes, angles=angles)
 
     def describe_lengths(self) -> str:
         """Write the four lengths with four significant digits, in mm."""
