@@ -150,6 +150,12 @@ what draws SVG but is no browser does not read it.
 """
 
 
+def add_dark_form(svg: bytes) -> bytes:
+    """Give an SVG file the form that readers of dark pages see."""
+    head, tag, rest = svg.partition(b"<defs>")
+    return head + _DARK_FORM + tag + rest
+
+
 class Drawing:
     """A figure that a notebook shows, and that `save` writes."""
 
@@ -169,10 +175,7 @@ class Drawing:
     def render(self, file_format: str) -> bytes:
         """Return the bytes of a file; an SVG file has a form for dark pages too."""
         drawn = self._render(file_format)
-        if file_format != "svg":
-            return drawn
-        head, tag, rest = drawn.partition(b"<defs>")
-        return head + _DARK_FORM + tag + rest
+        return add_dark_form(drawn) if file_format == "svg" else drawn
 
     def _render(self, file_format: str) -> bytes:
         buffer = io.BytesIO()
