@@ -203,7 +203,15 @@ def _choose_output(table: bool, as_json: bool, as_csv: bool, out: Path | None) -
 
 @click.command()
 @given.scene_argument
-@given.at_option
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="POSITION",
+    help=(
+        'Position, like "60 deg", "time=0.2 s", "B_x=80 mm", "F12_y=max" or any column'
+        " with a value, min or max; repeatable."
+    ),
+)
 @click.option(
     "--positions",
     metavar="SCENE:ANGLE",

@@ -51,26 +51,8 @@ _KEYS_OF_A_SCENE = (
 )
 
 
-def _read_units(
-    context: click.Context,
-    parameter: click.Parameter,
-    text: str | None,
-) -> Conversion | None:
-    return None if text is None else units(text)
-
-
 scene_argument = click.argument("scene", type=FILE_PATH)
 TABLE_ENDINGS = (".txt", ".json")
-at_option = click.option(
-    "--at",
-    "at",
-    multiple=True,
-    metavar="POSITION",
-    help=(
-        'Position, like "60 deg", "time=0.2 s", "B_x=80 mm", "F12_y=max" or any column'
-        " with a value, min or max; repeatable."
-    ),
-)
 
 
 def units_option(default: str = "those of the file") -> Callable[..., Any]:
@@ -80,7 +62,7 @@ def units_option(default: str = "those of the file") -> Callable[..., Any]:
     )
     return click.option(
         "--units",
-        callback=_read_units,
+        type=units,
         metavar="UNITS",
         help=help_text,
     )
@@ -92,26 +74,19 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
     An ending that belongs to another form is refused; without endings any is taken.
     """
 
-    def require_ending(
-        context: click.Context,
-        parameter: click.Parameter,
-        out: Path | None,
-    ) -> Path | None:
-        if endings and out and out.suffix and out.suffix.lower() not in endings:
-            raise InputError(
-                "path",
-                str(out),
-                f"must end in {', '.join(endings)}, or have no ending",
-            )
-        return out
+    def read_path(text: str) -> Path:
+        ending = Path(text).suffix.lower()
+        if endings and ending and ending not in endings:
+            allowed = f"must end in {', '.join(endings)}, or have no ending"
+            raise InputError("path", text, allowed)
+        return Path(text)
 
     help_text = "Write to FILE." if required else "Write to FILE instead of printing."
     return click.option(
         "-o",
         "--out",
-        type=FILE_PATH,
+        type=read_path,
         required=required,
-        callback=require_ending,
         metavar="FILE",
         help=help_text,
     )

@@ -156,16 +156,15 @@ def list_peaks(solution: Solution, facts: Facts | None) -> dict[str, float | Non
     """
     sizes = {} if solution.F12 is None else compute_pin_loads(solution)
     drive = read_drive_demand(solution)
-    if solution.scene.motion.free is None and drive.values is not None:
-        sizes[drive.keys.value] = drive.sizes
+    sizes[drive.keys.value] = drive.sizes
     peaks = dict[str, float | None]()
     for name, values in sizes.items():
         if not np.isfinite(values).any():
             continue
         peaks[name] = float(np.nanmax(values))
         if facts is not None:
-            peak = facts.motion.find_peak(name)
-            peaks[name] = peak and abs(peak.value)
+            peak = abs(facts.motion.find_peak(name).value)
+            peaks[name] = peak if math.isfinite(peak) else None
     size = peaks.get(drive.keys.value)
     if size is not None and size <= find_drive_rounding(solution):
         peaks[drive.keys.value] = 0.0

@@ -5,21 +5,20 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.effects import Spring, Springs, Torsion
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
-from fourbar.quantities import CHANGE_POINT, WOUND, Array
+from fourbar.quantities import CHANGE_POINT, WOUND, Array, Mask
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
 from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
-from fourbar.solution import Conversion, Solution, where_assembled
+from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
-from fourbar.studies.course import MotionCourse, Stretch, bisect, list_stretches
+from fourbar.studies.course import MotionCourse, Stretch, list_stretches
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
@@ -147,25 +146,23 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
     springs = list_springs(scene)
     if not springs:
         return []
-    course = None
     is_whole = solution.command_at is not None
     if not is_whole and goes_on_between(solution):
         is_whole = {*command(scene).places[[0, -1]]} == {*solution.at.places[[0, -1]]}
-    if is_whole:
-        course = MotionCourse(scene, "position", solution)
-        solution = course.solution
     notes = []
     for number, spring in enumerate(springs, 1):
-        distance = measure_end_distance(scene, spring, solution.at)
-        distance = where_assembled(solution, distance)
         for sense, end, room, sentence in _list_ends(spring):
-            beyond = sense * (distance - end) > room
+            is_beyond = partial(_mark_beyond, spring, sense, end + sense * room)
+            motion = solution
+            if is_whole:
+                motion = MotionCourse(scene, "position", solution, is_beyond).solution
+            beyond = is_beyond(motion)
             # a spring that pulls throughout may be one that does
-            if not beyond.any() or (room == 0.0 and not (distance < end).any()):
+            if not beyond.any() or (room == 0.0 and beyond[motion.assembled].all()):
                 continue
-            stretches = _list_stretches(course, solution, spring, end, beyond)
             where = " and ".join(
-                write_stretch(solution, one, units) for one in stretches
+                write_stretch(motion, stretch, units)
+                for stretch in list_stretches(beyond, motion.at.places)
             )
             length = write_short(end, "m", units)
             said = sentence.format(length=length, where=where)
@@ -261,45 +258,10 @@ def measure_end_distance(scene: Scene, spring: Spring, at: Command) -> Array:
     return np.broadcast_to(np.abs(across), at.places.shape)
 
 
-def _list_stretches(
-    course: MotionCourse | None,
-    solution: Solution,
-    spring: Spring,
-    end: float,
-    beyond: NDArray[np.bool_],
-) -> list[Stretch]:
-    """List where a spring is beyond a length, from where it is at positions.
-
-    A step in which nothing lies between the two positions ends at the one that is
-    beyond: steps of a list, and those where the loop does not close.
-
-    `course`: of the motion that the solution goes through; None where there is none,
-    and other angles alone can lie between the positions.
-    """
-    at = solution.at
-    is_listed = isinstance(solution.scene.motion.angle, np.ndarray)
-    stands_alone = is_listed or at.moves_stroke or at.time is not None
-
-    def locate(rows: NDArray[np.intp], ends: Array) -> Array:
-        passes = solution.assembled[rows] & solution.assembled[rows + 1]
-        if not passes.any() or (course is None and stands_alone):
-            return ends
-        before = at.part(rows[passes])._replace(origin=None)
-
-        def is_longer(there: Array) -> NDArray[np.bool_]:
-            between = before._replace(angle=there)
-            if course is not None:
-                between = course.command(there)
-            distance = measure_end_distance(solution.scene, spring, between)
-            return np.greater(distance, end)
-
-        low, high = (at.places[rows[passes] + after] for after in (0, 1))
-        longer = is_longer(low)
-        low, high = bisect(lambda there: is_longer(there) == longer, low, high)
-        ends[passes] = 0.5 * (low + high)
-        return ends
-
-    return list_stretches(beyond, solution.at.places, locate)
+def _mark_beyond(spring: Spring, sense: float, end: float, solution: Solution) -> Mask:
+    """Mark the positions at which a spring is longer, or shorter, than a length."""
+    distance = measure_end_distance(solution.scene, spring, solution.at)
+    return solution.assembled & (sense * distance > sense * end)
 
 
 def write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:

@@ -205,7 +205,11 @@ def _collect_shown(
             one = set_branch(scene, sign)
             solution = solve(one, stage, at=command_at(one, places))
             if start is not None and len(command(scene).angle) == 1:
-                _count_turns_from(start, solution)
+                # there the angles that are not commanded lie within (-pi, pi]
+                for of_bar in {"theta_2", *ANGLES} - {commanded}:
+                    angles = getattr(solution, of_bar)
+                    turns = np.ceil(angles[start] / math.tau - 0.5)
+                    angles -= math.tau * np.nan_to_num(turns)
         branches[str(sign)] = _collect_columns(solution)
     theta_2 = solution.theta_2
     if name != "theta_2":
@@ -215,7 +219,10 @@ def _collect_shown(
         branches[str(motion.branch)]["energy"] = energies.kinetic
     rate = pace = None
     if made is not None:
-        rate = _choose_rate(float(places[-1] - places[0]))
+        # a power of ten for a motion that is too short or too long to watch
+        duration = float(places[-1] - places[0])
+        power = math.log10(duration / np.clip(duration, *_WATCHED))
+        rate = 10.0 ** math.copysign(math.ceil(abs(power)), power)
         pace = _describe_pace(made, rate, len(places))
     has_one_speed = made is None and not isinstance(motion.speed, np.ndarray)
     return {
@@ -233,25 +240,6 @@ def _collect_shown(
         "pace": pace,
         "positions": len(covered.angle),
     }
-
-
-def _choose_rate(duration: float) -> float:
-    """Choose a power of ten for a motion that is too short or too long to watch."""
-    shortest, longest = _WATCHED
-    power = 0
-    if 0.0 < duration < shortest:
-        power = math.floor(math.log10(duration / shortest))
-    elif duration > longest:
-        power = math.ceil(math.log10(duration / longest))
-    return float(10.0**power)
-
-
-def _count_turns_from(row: int, solution: Solution) -> None:
-    """Put the angles that are not commanded within (-pi, pi] at one position."""
-    for name in ("theta_2", *ANGLES):
-        angles = getattr(solution, name)
-        if name != solution.commanded and np.isfinite(angles[row]):
-            angles -= math.tau * np.ceil(angles[row] / math.tau - 0.5)
 
 
 def thin_out(positions: Command) -> Command:
@@ -423,6 +411,13 @@ def write_page(
         address = live.split("/")[2]
         scene = replace(scene, tolerances=())
     data = collect_page_data(scene, pictures or {}, units, midway=bool(live))
+    embedded = json.dumps(
+        data | {"vectors": vectors, "live": live},
+        allow_nan=False,
+        separators=(",", ":"),
+    )
+    for mark in "<>&":  # whatever strings it holds, it stands inside a script element
+        embedded = embedded.replace(mark, f"\\u{ord(mark):04x}")
     return Template(asset("page.html")).substitute(
         title=html.escape(shorten_text(scene.title, 200) or "Four-bar linkage"),
         source=html.escape(shorten_text(scene.source, 400)),
@@ -436,7 +431,7 @@ def write_page(
         panel=asset("edit.html") if live else "",
         strip=_STRIP if live else "",
         results=asset("bench.html") if live else "",
-        data=_embed_json(data | {"vectors": vectors, "live": live}),
+        data=embedded,
     )
 
 
@@ -444,11 +439,3 @@ def _hash_content(text: str) -> str:
     """Return the hash by which the page's security policy allows a script or style."""
     digest = hashlib.sha256(text.encode("utf-8")).digest()
     return f"sha256-{base64.b64encode(digest).decode('ascii')}"
-
-
-def _embed_json(value: object) -> str:
-    """Write JSON that can stand inside a script element, whatever strings it holds."""
-    text = json.dumps(value, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    for mark in "<>&":
-        text = text.replace(mark, f"\\u{ord(mark):04x}")
-    return text

@@ -20,6 +20,7 @@ from fourbar.formulas.mobility import (
 )
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, PIN_FORCE
 from fourbar.quantities import (
+    CHANGE_POINT,
     JAMMED,
     LINE,
     OK,
@@ -36,7 +37,12 @@ from fourbar.show.columns import explain_static
 from fourbar.show.driving import name_places
 from fourbar.show.duty import MotorDuty
 from fourbar.show.lines import find_block_width, wrap_line
-from fourbar.show.motion_curves import MotionCurves, acts, find_drive_rounding
+from fourbar.show.motion_curves import (
+    MotionCurves,
+    acts,
+    find_drive_rounding,
+    find_largest,
+)
 from fourbar.show.panels import LOWER, TIED, UPPER, Peak
 from fourbar.show.position_sheet import PositionSheet
 from fourbar.show.shown_units import (
@@ -245,44 +251,41 @@ class SceneBlock(Facts):
             f" {self._place(least.place)}"
         )
         yield from self._write_statuses()
-        yield from self._write_stretches()
+        stretches = [
+            write_stretch(self.solution, stretch, self.units)
+            for stretch in self.motion.stretches
+        ]
+        if stretches:
+            yield f"assembles {', and '.join(stretches)}"
         yield from self._write_static_hint()
 
     def _write_statuses(self) -> Iterator[str]:
         """Write how many positions have which status, where one is not ok."""
-        codes = np.bincount(self.solution.status_code)
-        counts = {STATUS_NAMES[code]: codes[code] for code in np.flatnonzero(codes)}
-        beside = self._find_beside_change_points()
-        parts = []
-        if len(beside):
-            away = self._angle(float(beside.max()))
-            parts = [f"{len(beside)} within {away} of a change point"]
-            counts["ok"] -= len(beside)
-        elif {*counts} == {"ok"}:
+        codes = self.solution.status_code
+        away = self._measure_to_change_points()
+        beside = (codes == OK) & (away <= _BESIDE_CHANGE_POINT)
+        words = [name.replace("_", " ") for name in STATUS_NAMES]
+        words[CHANGE_POINT] = "at a change point"
+        furthest = self._angle(float(np.max(away, where=beside, initial=0.0)))
+        words.append(f"within {furthest} of a change point")
+        counts = np.bincount(np.where(beside, len(STATUS_NAMES), codes))
+        if counts[OK] == len(codes):
             return
-        words = {"change_point": "at a change point"}
-        parts[:0] = [
-            f"{count} {words.get(name, name.replace('_', ' '))}"
-            for name, count in counts.items()
-            if count
-        ]
-        total = write_count(len(self.solution), "position")
+        parts = [f"{counts[code]} {words[code]}" for code in np.flatnonzero(counts)]
+        total = write_count(len(codes), "position")
         yield f"{total}: {', '.join(parts)}"
-        if self.has_forces and np.isin(self.solution.status_code, _NOT_IN_PEAKS).any():
+        if self.has_forces and np.isin(codes, _NOT_IN_PEAKS).any():
             yield "    peaks and means are without the positions that have no forces"
 
-    def _find_beside_change_points(self) -> Array:
-        """Return the distances of positions evaluated beside a change point, rad, (n,).
+    def _measure_to_change_points(self) -> Array:
+        """Measure how far each position is from the nearest change point, rad, (n,).
 
-        The rounding of the angle keeps such a position from the change point that is
-        meant.
+        The rounding of the angle keeps a position from the change point that is meant.
         """
         at = self.solution.at
-        angle = at.angle[self.solution.status_code == OK]
-        away = angle[:, None] - np.array(change_points(self.linkage, at.bar))
+        away = at.angle[:, None] - np.array(change_points(self.linkage, at.bar))
         away = np.abs(away - TURN * np.rint(away / TURN))
-        nearest = np.min(away, axis=1, initial=np.inf)
-        return np.asarray(nearest[nearest <= _BESIDE_CHANGE_POINT])
+        return np.asarray(np.min(away, axis=1, initial=np.inf))
 
     def _write_static_hint(self) -> Iterator[str]:
         """Say what asks for forces, if a scene with loads states positions alone."""
@@ -397,31 +400,22 @@ class SceneBlock(Facts):
             " possible"
         )
 
-    def _write_stretches(self) -> Iterator[str]:
-        """Write where the assembly ends."""
-        parts = [
-            write_stretch(self.solution, stretch, self.units)
-            for stretch in self.motion.stretches
-        ]
-        if parts:
-            yield f"assembles {', and '.join(parts)}"
-
     def _write_drive(self) -> Iterator[str]:
         """Write what drives: peak and mean, power and energy, and its needs.
 
         The needs are those of a motor or a cylinder.
         """
-        if self.drive is None:
+        if not self.drives:
             return
         yield self._write_drive_head()
         yield _row("force" if self.linear else "torque", self._write_peak())
-        if self.held and self.peak is not None:
+        if self.held and math.isfinite(self.peak.value):
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
         started = self.motion.started
         start = self.motion.start
         row = self._write_growth(self.drive.keys.value, *started)
-        if start is not None:
+        if math.isfinite(start.value):
             value = self._value(start.value, self.drive.unit)
             row = f"{value} at {self._place(start.place)}"
         if row and started[0] is not self.motion:
@@ -434,18 +428,16 @@ class SceneBlock(Facts):
     def _write_peak(self) -> str:
         """Write the largest and the RMS value of the drive's torque or force."""
         drive = self.drive
-        assert drive is not None
-        if self.peak is None:
+        if math.isinf(self.peak.value):
             return self._write_growth(drive.keys.value)
         largest = self._without_rounding(self.peak.value)
         peak = self._value(largest, drive.unit)
         if self.duty is None:
             return peak
         row = f"peak {peak} at {self._place(self.peak.place)}{self._of_positions}"
-        rms = self.motion.find_rms(drive.keys.value)
-        if rms is None:
+        rms = self._without_rounding(self.motion.find_rms(drive.keys.value))
+        if math.isnan(rms):
             return row
-        rms = self._without_rounding(rms)
         mean = self._value(rms, drive.unit, largest, FAR_BELOW_PEAK)
         return f"{row}, RMS {mean}"
 
@@ -473,7 +465,6 @@ class SceneBlock(Facts):
         rests = "dry friction holds"
         if not self.is_held_at_rest:
             rests = "a pin with dry friction rests"
-        assert self.drive is not None
         growth = self._write_growth(self.drive.keys.value, *self.motion.begun)
         parts = [growth] if growth else []
         for least, most, ends, varies in () if growth else self.held:
@@ -496,24 +487,19 @@ class SceneBlock(Facts):
     def _rounding(self) -> float:
         """Rounding of the drive's torque or force, or its error bar if that is more."""
         rounding = find_drive_rounding(self.solution)
-        if self.drive is None or self.drive.error is None:
-            return rounding
         return max(rounding, float(np.nanmax(self.drive.error, initial=0.0)))
 
     def _is_balanced(self) -> bool:
         """Tell whether the drive has nothing to do: its peak is rounding alone."""
-        peak = self.peak
-        drive = self.drive
-        if peak is None or drive is None or not np.nan_to_num(drive.sizes).any():
-            return False
-        return not self._without_rounding(peak.value)
+        moves = np.nan_to_num(self.drive.sizes).any()
+        return bool(moves) and not self._without_rounding(self.peak.value)
 
     def _write_power(self) -> Iterator[str]:
         """Write power and energy of the drive, and what a motor must have."""
         duty = self.duty
         power = self.solution.power
         if duty is None:
-            idle = self.peak and not self._without_rounding(self.peak.value)
+            idle = not self._without_rounding(self.peak.value)
             if power is not None and power[0] and not idle:
                 yield _row("power", self._value(float(power[0]), "W"))
             return
@@ -633,7 +619,7 @@ class SceneBlock(Facts):
         Where dry friction holds a linkage at rest, they suffice to move it.
         """
         ways = [way.panels for way in self.motion.begun]
-        if not all(way.has_value(LINE.value) for way in ways):
+        if math.isinf(find_largest(LINE.value, self.motion.begun)):
             yield _row("bore", "none is enough, as the force grows without bound")
             return
         parts = []
@@ -657,7 +643,7 @@ class SceneBlock(Facts):
         cells, places = self._write_peaks(PIN_FORCES, "N")
         rows = [("pins", [*PIN_FORCE]), ("  peak", cells), ("  at", places)]
         means = [self.motion.find_rms(name) for name in PIN_FORCES]
-        if means != [None] * len(means):
+        if np.isfinite(means).any():
             rows.append(("  RMS", self._cells(means, "N")))
         rows += self._list_from_rest(PIN_FORCES, "N")
         yield from _align(rows, self.width)
@@ -675,12 +661,8 @@ class SceneBlock(Facts):
         ways = self.motion.begun
         if ways[0] is self.motion:
             return []
-        sizes = list[float | None]()
-        for name in names:
-            peaks = [way.find_peak(name) for way in ways]
-            known = [abs(peak.value) for peak in peaks if peak]
-            sizes.append(max(known) if len(known) == len(ways) else None)
-        cells = self._cells(sizes, unit, "unbounded")
+        sizes = [find_largest(name, ways) for name in names]
+        cells = self._cells(sizes, unit)
         adds = cells != self._write_peaks(names, unit)[0]
         stresses = self._list_stresses(sizes) if unit == "N m" else []
         return [("  to move", cells), *stresses] if adds else []
@@ -689,12 +671,12 @@ class SceneBlock(Facts):
         """Write the largest bending moment of each bar, with its place and position."""
         bending = self.bending
         from_rest = self._list_from_rest(_BENDING, "N m")
-        peaks = [bar.peak for bar in bending.values()]
-        if not from_rest and all(peak and not peak.value for peak in peaks):
+        peaks = [bar.peak.value for bar in bending.values()]
+        if not from_rest and not any(peaks):
             return
         moments, places = self._write_peaks(_BENDING, "N m")
         for index, (peak, x, *_) in enumerate(bending.values()):
-            if peak and peak.value:
+            if peak.value and math.isfinite(peak.value):
                 along = self._value(x, "m", self.longest)
                 over = "" if self.kind == "position" else f", {places[index]}"
                 places[index] = along + over
@@ -702,25 +684,21 @@ class SceneBlock(Facts):
             ("bending", [f"bar {bar}" for bar in bending]),
             ("  moment", moments),
             ("  at x", places),
-            *self._list_stresses([peak and peak.value for peak in peaks]),
+            *self._list_stresses(peaks),
             *from_rest,
         ]
         yield from _align(rows, self.width)
         yield from list_couple_notes(self.scene)
 
-    def _list_stresses(
-        self, moments: Sequence[float | None]
-    ) -> list[tuple[str, list[str]]]:
+    def _list_stresses(self, moments: Sequence[float]) -> list[tuple[str, list[str]]]:
         """List the row of stresses by bending moments of bars 2, 3 and 4.
 
         A bar without a cross-section has none.
         """
-        moduli = [bar.section_modulus for bar in self.linkage.moving]
-        stresses = [
-            None if moment is None or not modulus else moment / modulus
-            for moment, modulus in zip(moments, moduli, strict=True)
-        ]
-        if stresses.count(None) == len(stresses):
+        moduli = [bar.section_modulus or math.nan for bar in self.linkage.moving]
+        stresses = np.divide(moments, moduli)
+        stresses[np.isinf(stresses)] = np.nan
+        if np.isnan(stresses).all():
             return []
         return [("  stress", self._cells(stresses, "Pa"))]
 
@@ -732,21 +710,20 @@ class SceneBlock(Facts):
         A curve may grow without bound there.
         """
         peaks = [self.motion.find_peak(name) for name in names]
-        sizes = _drop_small([peak and peak.value for peak in peaks])
-        places = []
-        for peak, size, name in zip(peaks, sizes.tolist(), names, strict=True):
-            place = peak.place if peak else self.motion.panels.list_poles(name)[0]
-            places.append(self._place(place, named=False) if size else "-")
-        return self._cells(sizes, unit, "unbounded"), places
+        sizes = _drop_small([peak.value for peak in peaks])
+        places = [
+            self._place(peak.place, named=False) if size else "-"
+            for peak, size in zip(peaks, sizes, strict=True)
+        ]
+        return self._cells(sizes, unit), places
 
-    def _cells(
-        self, values: Iterable[float | None], unit: str, missing: str = "-"
-    ) -> list[str]:
-        """Write quantities of one kind; `missing` stands for none."""
+    def _cells(self, values: Iterable[float | None], unit: str) -> list[str]:
+        """Write quantities of one kind; a dash for none."""
         numbers = _drop_small(values)
-        largest = float(np.nanmax(np.abs(numbers), initial=0.0))
+        largest = _find_largest(numbers)
+        words = {"nan": "-", "inf": "unbounded"}
         return [
-            missing if math.isnan(number) else self._value(number, unit, largest)
+            words.get(str(number)) or self._value(number, unit, largest)
             for number in numbers.tolist()
         ]
 
@@ -772,7 +749,7 @@ class SceneBlock(Facts):
             )
         yield from self._warn()
         yield from list_notes(solution, self.units)
-        if self.drive is not None and self._is_balanced():
+        if self._is_balanced():
             yield f"the {self.drive.name} is zero within rounding"
         elif self.error is not None:
             below = "zero"
@@ -792,13 +769,11 @@ class SceneBlock(Facts):
         """
         solution = self.solution
         drive = self.drive
-        if drive is None or drive.error is None or solution.drive_condition is None:
-            return
-        if not self._without_rounding(float(np.nanmax(drive.sizes, initial=0.0))):
-            return  # nothing has digits to lose
         share = self.relate_errors(drive.error, drive.sizes)
         if not np.nanmax(share, initial=0.0) > _FEW_DIGITS:
             return
+        if not self._without_rounding(float(np.nanmax(drive.sizes))):
+            return  # nothing has digits to lose
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
         place = self._place(float(solution.at.places[worst]))
@@ -816,7 +791,9 @@ class SceneBlock(Facts):
         bars = min(sines, key=lambda pair: sines[pair])
         gap = math.asin(min(sines[bars], 1.0))
         apart = write_short(gap, "rad", self.units, digits=2)
-        yield f"{start}: bars {bars} are {apart} from being {_name_meeting(bars)}"
+        # bars 2 and 4 share no pin
+        meeting = "parallel" if bars == BARS_IN_LINE[3] else "in line"
+        yield f"{start}: bars {bars} are {apart} from being {meeting}"
 
 
 def _shorten(places: list[str]) -> list[str]:
@@ -832,12 +809,12 @@ def _row(label: str, text: str) -> str:
 def _drop_small(values: Iterable[float | None]) -> Array:
     """Return zero for what is rounding of the largest of their kind, NaN for none."""
     numbers = np.array([*values], dtype=float)
-    return drop_rounding(numbers, np.nanmax(np.abs(numbers), initial=0.0))
+    return drop_rounding(numbers, _find_largest(numbers))
 
 
-def _name_meeting(bars: str) -> str:
-    """Name what two bars of `BARS_IN_LINE` are; bars 2 and 4 share no pin."""
-    return "parallel" if bars == BARS_IN_LINE[3] else "in line"
+def _find_largest(numbers: Array) -> float:
+    sizes = np.abs(numbers)
+    return float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
 
 
 def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:

@@ -22,7 +22,6 @@ from fourbar.quantities import (
 )
 from fourbar.scene import Scene
 from fourbar.show.acting import list_springs, measure_end_distance
-from fourbar.show.driving import read_drive_demand
 from fourbar.show.duty import shaking_force, shaking_moment
 from fourbar.solution import (
     Conversion,
@@ -45,7 +44,7 @@ def derive(solution: Solution, name: str) -> Any:
     quantity = find_derived(name)
     if quantity is None:
         return find_values(solution, name)
-    if quantity.stage == "force" and read_drive_demand(solution).values is None:
+    if quantity.stage == "force" and solution.F12 is None:
         return None
     with np.errstate(all="ignore"):
         of_spring = SPRING_NAME.fullmatch(name)

@@ -27,9 +27,12 @@ class Driving(NamedTuple):
     name: str
     symbol: str
     unit: str
-    values: Array | None
-    """(n,); None where only positions are known."""
-    error: Array | None
+    values: Array
+    """(n,); NaN where only positions are known, and of a released linkage, whose drive
+    does nothing.
+    """
+    error: Array
+    """Error bars, (n,); NaN where none were computed."""
     keys: DriveNames
     """Names of its torque or force among the quantities."""
     speed_key: str
@@ -37,8 +40,7 @@ class Driving(NamedTuple):
 
     @property
     def sizes(self) -> Array:
-        """Sizes of torque or force, (n,), where forces are known."""
-        assert self.values is not None
+        """Sizes of torque or force, (n,)."""
         return np.abs(self.values)
 
 
@@ -53,8 +55,12 @@ def read_drive_demand(solution: Solution) -> Driving:
         symbol = "F"
         word = "drive force"
         speed = "stroke_speed"
-    values = getattr(solution, names.value)
-    error = getattr(solution, names.error)
+    values, error = (getattr(solution, name) for name in names[:2])
+    none = np.full(solution.theta_2.shape, np.nan)
+    if values is None or solution.stated.motion.free is not None:
+        values = error = none
+    if error is None:
+        error = none
     return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
 
 
@@ -128,8 +134,6 @@ def is_once_round(solution: Solution) -> bool:
     another speed than it begins with.
     """
     angle = solution.at.angle
-    if len(angle) == 1:
-        return False
     period = float(count_turns(solution.stated.linkage.lengths, solution.at.bar))
     turns = abs(angle[-1] - angle[0]) / (2.0 * np.pi * period)
     if turns <= 0.5 or not np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0):
@@ -138,5 +142,5 @@ def is_once_round(solution: Solution) -> bool:
     return all(
         abs(rate[-1] - rate[0]) <= _SAME_RATE * np.abs(rate).max()
         for rate in rates
-        if isinstance(rate, np.ndarray) and rate.size > 1
+        if isinstance(rate, np.ndarray) and rate.ndim
     )

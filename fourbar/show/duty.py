@@ -3,6 +3,7 @@
 Bearings and a motor are chosen by them; the JSON of `analyze` has them.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
 from fourbar.show.driving import is_once_round, read_drive_demand
-from fourbar.show.motion_curves import MotionCurves, describe_motion
+from fourbar.show.motion_curves import MotionCurves, describe_motion, find_largest
 from fourbar.solution import Conversion, Solution, find_unit_in
 
 
@@ -172,11 +173,12 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     name = PIN_FORCE[pin]
     motion = _describe_loads(solution)
     peak = motion.find_peak(name)
-    if peak is None:
+    if not math.isfinite(peak.value):
         return BearingLoad(None, None, None)
     where = motion.find_theta_2(peak.place)
     time = None if solution.time is None else peak.place
-    return BearingLoad(peak.value, motion.find_rms(name), where, time)
+    rms = motion.find_rms(name)
+    return BearingLoad(peak.value, None if math.isnan(rms) else rms, where, time)
 
 
 def motor_duty(solution: Solution) -> MotorDuty | None:
@@ -205,20 +207,17 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
     """
     expect("solution", solution, Solution)
     drive = read_drive_demand(solution)
-    if drive.values is None or not np.isfinite(drive.values).any():
+    if not np.isfinite(drive.values).any():
         return None
     motion = _describe_loads(solution)
     panels = motion.panels
     kind = "torque" if solution.drive is None else "force"
-    numbers: dict[str, Any] = dict.fromkeys(DUTY_UNITS)
+    numbers = dict.fromkeys(DUTY_UNITS, math.nan)
     for name, curve in ((kind, drive.keys.value), ("power", "power")):
         ways = motion.started if name == kind else [motion]
-        peaks = [way.find_peak(curve) for way in ways]
-        largest = [abs(peak.value) for peak in peaks if peak]
-        numbers[f"peak_{name}"] = max(largest) if len(largest) == len(ways) else None
+        numbers[f"peak_{name}"] = find_largest(curve, ways)
         numbers[f"rms_{name}"] = motion.find_rms(curve)
-    fastest = motion.find_peak("speed")
-    numbers["peak_speed"] = fastest and abs(fastest.value)
+    numbers["peak_speed"] = abs(motion.find_peak("speed").value)
     closed = bool(is_once_round(solution)) and not motion.stretches
     # over a stretch without forces the energies would be those of a part, unsaid
     whole = not np.isin(solution.status_code, (WOUND, JAMMED)).any()
@@ -238,7 +237,11 @@ def motor_duty(solution: Solution) -> MotorDuty | None:
                 sense = np.sign(np.mean(np.asarray(solution.at.speed)))
                 turned = sense * abs(angle[-1] - angle[0])
                 numbers["mean_torque"] = float(given / second / turned)
-    return MotorDuty(closed=closed, **numbers)
+    bounded: dict[str, Any] = {
+        name: number if math.isfinite(number) else None
+        for name, number in numbers.items()
+    }
+    return MotorDuty(closed=closed, **bounded)
 
 
 def _describe_loads(solution: Solution) -> MotionCurves:
@@ -267,14 +270,14 @@ def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
 
     Numbers have the units of the output, and the keys are those of `motor_duty`.
     """
-    duty = motor_duty(solution)
-    if duty is None:
+    if solution.F12 is None or not np.isfinite(solution.F12).any():
         return None
+    duty = motor_duty(solution)
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
     of_pin = {"peak": "N", "rms": "N", "theta_2": "rad", "time": "s"}
     return {
-        "closed": duty.closed,
-        **convert((getattr(duty, name) for name in si), si, units),
+        "closed": duty is not None and duty.closed,
+        **convert((getattr(duty, name, None) for name in si), si, units),
         "pins": {
             pin: convert(bearing_load(solution, pin), of_pin, units)
             for pin in PIN_FORCE

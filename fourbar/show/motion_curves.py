@@ -6,7 +6,8 @@ follows on another. Between listed positions nothing is searched, and between th
 instants of a released motion only where its angles are largest or smallest.
 """
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -116,10 +117,11 @@ class MotionCurves:
         panels = self.panels
         if not panels.located or self.solution.F12 is None:
             return self.solution
-        peaks = [peak.place for peak in map(self.find_peak, panels.curves) if peak]
+        peaks = map(self.find_peak, panels.curves)
+        tops = [peak.place for peak in peaks if math.isfinite(peak.value)]
         away = _BESIDE_A_BREAK * panels.length
         stated = self.solution.at.places
-        found = np.concatenate([peaks, self.breaks - away, self.breaks + away])
+        found = np.concatenate([tops, self.breaks - away, self.breaks + away])
         places = np.union1d(stated, np.clip(found, stated.min(), stated.max()))
         if panels.start[0] > panels.stop[-1]:
             places = places[::-1]
@@ -177,20 +179,20 @@ class MotionCurves:
         return describe_motion(solve(scene, at=at))
 
     @cached_property
-    def start(self) -> Peak | None:
+    def start(self) -> Peak:
         """Largest torque or force of the drive that starts the motion from rest.
 
-        None if nothing starts, or if it grows without bound.
+        The value is NaN if nothing starts.
         """
-        name = read_drive_demand(self.solution).keys.value
         way = self.started[0]
-        if way is self or self.panels.located:
-            return None if way is self else way.find_peak(name)
-        at = self.solution.at
-        starts = find_senses(self.solution)[0] * at.acceleration > 0.0
-        values = way.solution[name]
-        row = int(np.argmax(np.nan_to_num(np.abs(values) * starts)))
-        return Peak(float(values[row]), float(at.places[row])) if starts[row] else None
+        if way is self:
+            return Peak(math.nan, math.nan)
+        panels = way.panels
+        if not panels.located:
+            at = self.solution.at
+            starts = find_senses(self.solution)[0] * at.acceleration > 0.0
+            panels = panels.leave_out(~starts)
+        return panels.find_peak(read_drive_demand(self.solution).keys.value)
 
     @property
     def is_steady(self) -> bool:
@@ -209,14 +211,14 @@ class MotionCurves:
             return None
         return abs(float(motion.speed or 0.0))
 
-    def find_peak(self, name: str) -> Peak | None:
-        """Find the largest size of a curve; None if it grows without bound."""
-        return self.panels.find_peak(name) if self.panels.has_value(name) else None
+    def find_peak(self, name: str) -> Peak:
+        """Find the largest size of a curve, as `Panels.find_peak` does."""
+        return self.panels.find_peak(name)
 
-    def find_rms(self, name: str) -> float | None:
-        """Return the RMS value of a curve; None if it has none."""
+    def find_rms(self, name: str) -> float:
+        """Return the RMS value of a curve; NaN if it has none."""
         if not self.is_steady or not self.panels.has_value(name):
-            return None
+            return math.nan
         return self.panels.find_rms(name)
 
     def find_theta_2(self, place: float) -> float:
@@ -249,6 +251,11 @@ class MotionCurves:
         passed = dict.fromkeys(numbers[numbers >= 0].tolist())
         others = [numbers == 1 - number for number in passed]
         return list(map(self.positions.leave_out, others))
+
+
+def find_largest(name: str, ways: Iterable[MotionCurves]) -> float:
+    """Find the largest size of a curve in any of several ways of a motion."""
+    return max(abs(way.find_peak(name).value) for way in ways)
 
 
 def describe_motion(solution: Solution) -> MotionCurves:

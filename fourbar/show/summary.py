@@ -16,7 +16,6 @@ from fourbar.quantities import OK, Array
 from fourbar.scene.motion import Motion, Sweep
 from fourbar.scene.scene import find_stroke_ranges
 from fourbar.show.driving import (
-    Driving,
     is_once_round,
     leaves_range,
     read_drive_demand,
@@ -48,8 +47,8 @@ leaves some 1e-8.
 class BarBending(NamedTuple):
     """Largest size of the bending moment of a bar."""
 
-    peak: Peak | None
-    """N m; None if it grows without bound."""
+    peak: Peak
+    """N m; infinite if it grows without bound."""
     x: float
     """Place of the peak along the bar, m from its first pin."""
     solution: Solution
@@ -97,6 +96,7 @@ class Facts:
         self.scene = solution.scene
         self.motion = describe_motion(solution)
         """Curves over the motion, with what grows without bound."""
+        self.drive = read_drive_demand(solution)
 
     @cached_property
     def kind(self) -> str:
@@ -141,13 +141,10 @@ class Facts:
             for panels in self.motion.of_circuits
         ]
 
-    @cached_property
-    def drive(self) -> Driving | None:
-        """Drive; None for a released linkage, and where only positions are known."""
-        if self.scene.motion.free is not None or self.solution.F12 is None:
-            return None
-        drive = read_drive_demand(self.solution)
-        return drive if np.isfinite(drive.sizes).any() else None
+    @property
+    def drives(self) -> bool:
+        """Return True if torque or force of the drive is known at any position."""
+        return bool(np.isfinite(self.drive.values).any())
 
     @property
     def has_forces(self) -> bool:
@@ -161,14 +158,14 @@ class Facts:
         return self.solution.drive is not None
 
     @cached_property
-    def peak(self) -> Peak | None:
-        """Largest torque or force of the drive, signed; None if it has no bound."""
-        return self.drive and self.motion.find_peak(self.drive.keys.value)
+    def peak(self) -> Peak:
+        """Largest torque or force of the drive, signed, as `Panels.find_peak`."""
+        return self.motion.find_peak(self.drive.keys.value)
 
     @cached_property
     def duty(self) -> MotorDuty | None:
         """Duty of the drive over a motion."""
-        at_one = self.drive is None or self.kind == "position"
+        at_one = not self.drives or self.kind == "position"
         return None if at_one else motor_duty(self.solution)
 
     @cached_property
@@ -197,7 +194,7 @@ class Facts:
         located = {}
         for bar, peak in peaks.items():
             solution = self.solution
-            if motion.panels.located and peak is not None:
+            if motion.panels.located and math.isfinite(peak.value):
                 # on a change point there are no forces, which it has beside it
                 away = _BESIDE * motion.panels.length * np.array([0.0, -1.0, 1.0])
                 places = np.clip(peak.place + away, min(self.ends), max(self.ends))
@@ -221,7 +218,7 @@ class Facts:
         """
         solution = self.solution
         rows = np.flatnonzero(leaves_range(solution))
-        if self.drive is None or not len(rows):
+        if not self.drives or not len(rows):
             return []
         name, _, *both = self.drive.keys
         if self.motion.panels.located and not np.any(solution.at.speed):
@@ -316,9 +313,8 @@ class Facts:
             return None
         loads = compute_pin_loads(self.solution)
         shares = self.relate_errors(error, np.max([*loads.values()], axis=0))
-        if self.drive is not None and self.drive.error is not None:
-            of_drive = self.relate_errors(self.drive.error, self.drive.sizes)
-            shares = np.append(shares, of_drive)
+        of_drive = self.relate_errors(self.drive.error, self.drive.sizes)
+        shares = np.append(shares, of_drive)
         known = shares[np.isfinite(shares)]
         return float(known.max()) if known.size else None
 

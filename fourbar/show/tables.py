@@ -174,8 +174,7 @@ def list_columns(
     for name in _list_names(solution):
         column = read_column(solution, name)
         shown |= _write_column(column, headings.get(name, name), units)
-        released = solution.scene.motion.free is not None
-        if name == "sin_mu" and drive.error is not None and not released:
+        if name == "sin_mu" and np.isfinite(drive.error).any():
             digits = _count_digits(drive.sizes, drive.error)
             shown[f"digits\nof {drive.symbol[0]}"] = digits
     return shown

@@ -23,7 +23,6 @@ from fourbar.solution import DEGREES, Conversion, find_unit_in
 from fourbar.studies.spread import (
     BAND_PERCENTILES,
     PARTED,
-    Spread,
     Tolerances,
     tolerances,
 )
@@ -104,7 +103,14 @@ def write_spreads(
         if np.isfinite(size).any():
             shown[part] = int(np.nanargmax(size))
     for part, worst in shown.items():
-        if most := _name_largest(spreads, spreads.spreads[part], worst):
+        shares = spreads.spreads[part].shares[:, worst]
+        percents = 100.0 * shares / (shares.sum() or 1.0)
+        most = ", ".join(
+            f"{percents[i]:.0f} % {spreads.scene.tolerances[i].key}"
+            for i in np.argsort(-shares)[:2]
+            if percents[i] > 0.0
+        )
+        if most:
             lines.append(f"  {part}: {most}")
     title = spreads.scene.title
     for digits in range(_MOST_SHOWN, _FEWEST_SHOWN - 1, -1):
@@ -214,18 +220,6 @@ def _name_positions(spreads: Tolerances, rows: Indices, units: Conversion) -> st
         places += ", ..."
     positions = write_count(len(spreads.theta_2), "position")
     return f"{rows.size} of {positions} ({name} = {places} {unit})"
-
-
-def _name_largest(spreads: Tolerances, spread: Spread, worst: int) -> str:
-    """Name the two tolerances with the largest shares of the variance."""
-    shares = spread.shares[:, worst]
-    total = shares.sum()
-    stated = spreads.scene.tolerances
-    return ", ".join(
-        f"{100.0 * shares[i] / total:.0f} % {stated[i].key}"
-        for i in np.argsort(-shares)[:2]
-        if 0.0 < shares[i] <= total
-    )
 
 
 def collect_tolerances(

@@ -9,7 +9,7 @@ forces.
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from math import inf, nan, pi, sin, sqrt
+from math import inf, isfinite, isinf, nan, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -415,7 +415,7 @@ def _judge_bending(judged):
     fine_motion = move_bars(judged.scene, commanded, judged.fine)
     for bar in MOVING_BARS:
         largest = judged.facts.bending[bar]
-        if largest.peak is None:
+        if isinf(largest.peak.value):
             continue
         there = judged.ask(largest.peak.place)
         motion = move_bars(judged.scene, commanded, there)
@@ -444,7 +444,7 @@ def _judge_growth(judged):
     an integral that could be judged, so none of it is believed.
     """
     bending = judged.facts.bending.values()
-    if not judged.growing and all(largest.peak is not None for largest in bending):
+    if not judged.growing and all(isfinite(largest.peak.value) for largest in bending):
         return
     conditions = _find_conditions(judged.scene, judged.fine)
     # a sine that passes through zero between two positions is no further from it there

@@ -1,5 +1,6 @@
 """Free-body diagrams of the three moving bars, all forces to one scale."""
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -183,7 +184,7 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
         column[0].set_title(f"Bar {bar} ({BAR_NAMES[bar]})\n{place}")
         column[2].set_xlabel(f"$x$ from ${first_pin}$ ({unit})")
         largest = "grows without bound; drawn is the largest of these positions,"
-        if worst.peak is not None:
+        if math.isfinite(worst.peak.value):
             moment = write_labelled_quantity(worst.peak.value, "N m", view.units)
             largest = f"= {moment}"
         foot = write_labelled_quantity(worst.x, "m", view.units)
