@@ -53,7 +53,7 @@ def classify_command(
     units = {"m": ("", 1.0)} if all(ratios) else units_of_length(lengths[0])
     with state_messages_in(units):
         linkage = FourBar(d, Bar(a), Bar(b), Bar(c))
-    if as_json:
+    if as_json or given.ends_in(out, ".json"):
         text = write_type_json(linkage)
     else:
         width = given.find_width(out)
@@ -395,9 +395,8 @@ def _write_summary(
 
     One position that answers `--at` has a block, several have a line each.
     """
-    from fourbar.show.block import SceneBlock
+    from fourbar.show.block import SceneBlock, write_paths
     from fourbar.show.located import list_positions
-    from fourbar.show.path_rows import write_paths
 
     if not asked:
         block = SceneBlock(solution, units, pressure, width)
@@ -428,8 +427,7 @@ def _write_positions(
     """Write every position, as JSON, CSV or a table, whose columns may be named."""
     from fourbar.show.acting import list_notes
     from fourbar.show.columns import choose_columns
-    from fourbar.show.duty import list_duty
-    from fourbar.show.path_rows import collect_paths
+    from fourbar.show.duty import collect_paths, list_duty
     from fourbar.show.tables import print_positions
 
     columns = [] if names is None else choose_columns(solution, names)
@@ -563,7 +561,7 @@ def equilibrium_command(scene: Path, as_json: bool, out: Path | None) -> None:
 
     with given.open_scene(scene) as described, show_running("zeros are sought"):
         rest = found(described)
-    if as_json:
+    if as_json or given.ends_in(out, ".json"):
         text = write_equilibria_json(described.title, rest)
     else:
         units = given.suit_file_units()

@@ -58,10 +58,6 @@ def _plane_options(command: Callable[..., str]) -> Callable[..., str]:
     return placed
 
 
-_A_LENGTH = re.compile(r"[\d.]+\w*")
-"""Name of a scene that is a fifth length."""
-
-
 def _export_command(command: Callable[..., str]) -> Callable[..., None]:
     """Add SCENE, --lengths and --omega; what the command makes of a scene is written.
 
@@ -89,7 +85,8 @@ def _export_command(command: Callable[..., str]) -> Callable[..., None]:
         out: Path,
         **options: Any,
     ) -> None:
-        if lengths is not None and _A_LENGTH.fullmatch(str(scene)):
+        # the name of a scene that is a fifth length
+        if lengths is not None and re.fullmatch(r"[\d.]+\w*", str(scene)):
             raise click.UsageError(f"--lengths are four: {ELSEWHERE}")
         if (scene is None) == (lengths is None):
             raise click.UsageError(

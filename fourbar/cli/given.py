@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +34,6 @@ from fourbar.writing import require_file, write_text
 
 _FILE_TABLES = "fourbar.file_tables"
 """Key of the tables of the scene file in the context of a command."""
-MOST_PRINTED = 1_000_000
-"""Positions that `analyze` prints: about a gigabyte of text."""
 FILE_PATH = click.Path(path_type=Path)
 LENGTH_NAMES = tuple(BAR_NAMES.values())
 """Names of four lengths, in the order in which commands take them."""
@@ -95,19 +92,12 @@ def text_option(*endings: str, required: bool = False) -> Callable[..., Any]:
 out_option = text_option(required=True)
 
 
-def json_option(command: Callable[..., None]) -> Callable[..., None]:
-    """Add --json, which a file of -o that ends in .json asks for too."""
-
-    @wraps(command)
-    def formed(as_json: bool, **others: Any) -> None:
-        command(as_json=as_json or ends_in(others.get("out"), ".json"), **others)
-
-    return click.option(
-        "--json",
-        "as_json",
-        is_flag=True,
-        help="Print one JSON object in SI units and radians.",
-    )(formed)
+json_option = click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON object in SI units and radians.",
+)
 
 
 def ends_in(out: Path | None, suffix: str) -> bool:
@@ -150,7 +140,8 @@ def open_scene(path: Path) -> Iterator[Scene]:
         out = context.params.get("out")
         if out is not None:
             require_file(out, path)
-        require_steps(scene.motion, MOST_PRINTED, "here", str(path))
+        # positions that `analyze` prints: about a gigabyte of text
+        require_steps(scene.motion, 1_000_000, "here", str(path))
         try:
             yield scene
         except InputError as error:

@@ -21,24 +21,6 @@ from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse, Stretch, list_stretches
 from fourbar.studies.passing import SAME_POSITION
 
-_INSTANTS_OF_AN_END = 33
-"""Instants of an interval of a table at which two choices of its ends are compared. The
-difference of two cubics has one maximum in it.
-"""
-AT_END_OF_STROKE = 1e-6
-"""Part of a gas spring's length within which it is at its end. A scene that states the
-end as a place has fewer digits than that.
-"""
-_PULLS = (
-    ' pulls {where} and pushes elsewhere: with acts = "push" or "pull" it acts one way'
-)
-"""Remark on a spring that both pushes and pulls."""
-_BEYOND = (
-    ", a gas spring, is {} length of {{length}} {{where}}: it is taken to push on, and"
-    " has no stops"
-)
-"""Remark on a gas spring that goes on beyond an end of its stroke."""
-
 
 def list_notes(solution: Solution, units: Conversion) -> list[str]:
     """List the remarks on what a scene states, and on what acts at its positions.
@@ -121,7 +103,9 @@ def _list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     t = np.array(law.time)
     if len(t) < FEWEST_POINTS["free"]:
         return []
-    ends = np.linspace(t[[0, -2]], t[[1, -1]], _INSTANTS_OF_AN_END).ravel()
+    # instants of an interval of a table at which two choices of its ends are compared.
+    # The difference of two cubics has one maximum in it
+    ends = np.linspace(t[[0, -2]], t[[1, -1]], 33).ravel()
     pairs = zip(law.at(ends), replace(law, ends=other).at(ends), strict=True)
     angle, _, acceleration = (float(np.abs(one - two).max()) for one, two in pairs)
     by = " and ".join(
@@ -151,21 +135,30 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
         is_whole = {*command(scene).places[[0, -1]]} == {*solution.at.places[[0, -1]]}
     notes = []
     for number, spring in enumerate(springs, 1):
-        for sense, end, room, sentence in _list_ends(spring):
+        for sense, end, room, is_there in _list_ends(spring):
             is_beyond = partial(_mark_beyond, spring, sense, end + sense * room)
             motion = solution
             if is_whole:
                 motion = MotionCourse(scene, "position", solution, is_beyond).solution
             beyond = is_beyond(motion)
             # a spring that pulls throughout may be one that does
-            if not beyond.any() or (room == 0.0 and beyond[motion.assembled].all()):
+            throughout = beyond[motion.assembled].all()
+            if not beyond.any() or (throughout and not is_there):
                 continue
             where = " and ".join(
                 write_stretch(motion, stretch, units)
                 for stretch in list_stretches(beyond, motion.at.places)
             )
             length = write_short(end, "m", units)
-            said = sentence.format(length=length, where=where)
+            said = (
+                f", a gas spring, is {is_there} length of {length} {where}: it is taken"
+                " to push on, and has no stops"
+            )
+            if not is_there:
+                said = (
+                    f' pulls {where} and pushes elsewhere: with acts = "push" or "pull"'
+                    " it acts one way"
+                )
             notes.append(f"spring {number}{said}")
     return notes
 
@@ -225,21 +218,20 @@ def _list_wound(
 def _list_ends(spring: Spring) -> list[tuple[float, float, float, str]]:
     """List the lengths beyond which a remark on a spring is due.
 
-    An entry has the sense of beyond, the length and the room at it, m, and the remark.
+    An entry has the sense of beyond, the length and the room at it, m, and what a gas
+    spring is there; its room is never 0, that of any other spring is.
     """
     if spring.stroke is None:
         if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:
-            return [(1.0, -spring.slack / spring.stiffness, 0.0, _PULLS)]
+            return [(1.0, -spring.slack / spring.stiffness, 0.0, "")]
         return []
-    room = AT_END_OF_STROKE * spring.length
+    # part of a gas spring's length within which it is at its end. A scene that states
+    # the end as a place has fewer digits than that
+    room = 1e-6 * spring.length
+    folded = spring.length - spring.stroke
     return [
-        (1.0, spring.length, room, _BEYOND.format("longer than its extended")),
-        (
-            -1.0,
-            spring.length - spring.stroke,
-            room,
-            _BEYOND.format("shorter than its compressed"),
-        ),
+        (1.0, spring.length, room, "longer than its extended"),
+        (-1.0, folded, room, "shorter than its compressed"),
     ]
 
 

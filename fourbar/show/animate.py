@@ -62,8 +62,6 @@ is thinned out evenly.
 """
 _WATCHED = (1.5, 60.0)
 """A motion through time that lasts between these, s, is shown in real time."""
-CENTRES = ("I13", "I24")
-"""Places that lie at infinity now and then: a figure has them, no curve."""
 DRIVE_SCALARS = (*COUPLE, "power", *LINE)
 """Numbers of a drive, which a released motion has not."""
 ANIMATED_SCALARS = (*ANGLES, "condition", *RATES, *DRIVE_SCALARS, "stroke")
@@ -289,7 +287,9 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
         for name in {"torque", "power", "drive_force"} & columns.keys():
             columns[name] = np.where(idle, 0.0, columns[name])
     for name in DERIVED_NAMES:
-        if name not in CENTRES and (values := derive(solution, name)) is not None:
+        values = derive(solution, name)
+        # centres lie at infinity now and then: a figure has them, no curve
+        if name not in ("I13", "I24") and values is not None:
             columns[name] = values
     return columns
 
@@ -338,8 +338,6 @@ _SCRIPTS = (
     "tolerances.js",
     "page.js",
 )
-_LIVE_SCRIPTS = ("fields.js", "drag.js", "edit.js")
-"""Additional scripts of the workbench."""
 
 
 def write_animation(
@@ -407,7 +405,7 @@ def write_page(
     address = ""
     if live:
         style += asset("edit.css")
-        script += asset(*_LIVE_SCRIPTS)
+        script += asset("fields.js", "drag.js", "edit.js")
         address = live.split("/")[2]
         scene = replace(scene, tolerances=())
     data = collect_page_data(scene, pictures or {}, units, midway=bool(live))

@@ -58,16 +58,13 @@ from fourbar.show.shown_units import (
     write_short,
 )
 from fourbar.show.summary import Facts
-from fourbar.solution import Conversion, Solution
+from fourbar.solution import Conversion, Solution, find_unit_in
+from fourbar.studies.paths import measure_paths
 
 _NBSP = "\u00a0"
 """Stands between a number and its unit until the lines are broken."""
-LEAST_COLUMN = 12
-"""Least width of a column."""
 INDENT = 11
 """Width of what stands before a row."""
-_HALF_OF_LAST = 0.5
-"""Part of the last digit shown from which on an error bar changes it."""
 _FEW_DIGITS = 1e-8
 """Error bar over the value from which on the block says where digits are lost. Half of
 the digits of a double are lost then.
@@ -78,16 +75,8 @@ FAR_BELOW_PEAK = 0.1
 """Part of its peak below which a mean has a prefix of its own: it would begin with 0.0.
 In a table all of one kind have one prefix, to be compared at a glance.
 """
-_BESIDE_CHANGE_POINT = 1e-9
-"""rad; an angle nearer to a change point is rounded from it: files state angles with
-nine decimals and more.
-"""
 _MOST_PLACES = 4
 """Number of places that are listed: of poles, and where dry friction holds a pin."""
-_NO_ANGLE = 1e-14
-"""rad; rounding of an angle of a turn."""
-_NOT_IN_PEAKS = (WOUND, JAMMED, SEVERAL)
-"""Statuses of positions between which no forces exist either."""
 _BENDING = [f"bending_{bar}" for bar in MOVING_BARS]
 """Names of the curves of the bending moments."""
 BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
@@ -213,15 +202,14 @@ class SceneBlock(Facts):
     def _place(self, place: float, *, named: bool = True) -> str:
         """Write a place as "theta_2 = 22.8 deg", or without its name."""
         first, last = self.ends
-        text = self._value(
-            drop_place_rounding(place, last - first),
-            self.unit,
-            {"m": self.longest, "s": 1.0}.get(self.unit),
-        )
+        shown = drop_place_rounding(place, last - first)
+        largest = {"m": self.longest, "s": 1.0}.get(self.unit)
+        text = self._value(shown, self.unit, largest)
         return f"{self.symbol}{_NBSP}={_NBSP}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
-        return self._value(0.0 if abs(angle) < _NO_ANGLE else angle, "rad")
+        # rad; rounding of an angle of a turn
+        return self._value(0.0 if abs(angle) < 1e-14 else angle, "rad")
 
     def _write_head(self) -> Iterator[str]:
         """Write what the linkage is: type, title, branch, lengths, change points."""
@@ -263,7 +251,9 @@ class SceneBlock(Facts):
         """Write how many positions have which status, where one is not ok."""
         codes = self.solution.status_code
         away = self._measure_to_change_points()
-        beside = (codes == OK) & (away <= _BESIDE_CHANGE_POINT)
+        # rad; an angle nearer to a change point is rounded from it: files state angles
+        # with nine decimals and more
+        beside = (codes == OK) & (away <= 1e-9)
         words = [name.replace("_", " ") for name in STATUS_NAMES]
         words[CHANGE_POINT] = "at a change point"
         furthest = self._angle(float(np.max(away, where=beside, initial=0.0)))
@@ -274,7 +264,8 @@ class SceneBlock(Facts):
         parts = [f"{counts[code]} {words[code]}" for code in np.flatnonzero(counts)]
         total = write_count(len(codes), "position")
         yield f"{total}: {', '.join(parts)}"
-        if self.has_forces and np.isin(codes, _NOT_IN_PEAKS).any():
+        # statuses of positions between which no forces exist either
+        if self.has_forces and np.isin(codes, (WOUND, JAMMED, SEVERAL)).any():
             yield "    peaks and means are without the positions that have no forces"
 
     def _measure_to_change_points(self) -> Array:
@@ -755,7 +746,8 @@ class SceneBlock(Facts):
             below = "zero"
             if self.error:
                 below = f"below 1e{math.ceil(math.log10(self.error)):+03d}"
-            last_digit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
+            # part of the last digit shown from which on an error bar changes it
+            last_digit = 0.5 * 10.0 ** (1 - self.digits) / 10.0
             changed = "none of these" if self.error < last_digit else "some"
             yield (
                 f"rounding changes {changed} digits (worst error bar {below} of the"
@@ -822,7 +814,8 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
 
     Cells beyond so many columns follow in further rows of the same labels.
     """
-    width = max(LEAST_COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
+    # least width of a column
+    width = max(12, 2 + max(len(cell) for _, cells in rows for cell in cells))
     fitting = max(1, (most - INDENT + 2) // width)
     return [
         f"{label:<{INDENT}}{''.join(f'{cell:<{width}}' for cell in part)}".rstrip()
@@ -830,3 +823,31 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
         for label, cells in rows
         if (part := cells[first : first + fitting])
     ]
+
+
+def write_paths(solution: Solution, units: Conversion) -> list[str]:
+    """Write lines for each point: its extent, and how straight its path is."""
+    lines = []
+    name, unit = name_places(solution)
+    factor, place = choose_unit(1.0, unit, units)
+    turned, angle = find_unit_in("rad", units)
+    for point, path in measure_paths(solution).items():
+        largest = max(path.stroke, *map(abs, (*path.x, *path.y)))
+        per_metre, length = choose_unit(largest, "m", units)
+        extents = np.array([*path.x, *path.y, path.straightness, path.stroke])
+        left, right, below, above, across, along = (
+            f"{per_metre * number:#.6g}".rstrip(".")
+            for number in drop_rounding(extents, largest).tolist()
+        )
+        (direction,) = drop_rounding(np.array([path.direction]), np.pi)
+        first, last = (f"{factor * end + 0.0:.6g}" for end in path.ends)
+        extent = (
+            f"x from {left} to {right} {length}, y from {below} to {above} {length}"
+        )
+        lines += [
+            *wrap_line(f"path of {clean_line(point)}: {extent}"),
+            f"    straightness {across} {length}, stroke {along} {length} along"
+            f" {angle * direction:.6g} {turned},",
+            f"    from {name} = {first} to {last} {place}",
+        ]
+    return lines

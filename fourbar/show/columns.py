@@ -36,8 +36,6 @@ from fourbar.solving import solve
 COLUMN_AXES = {"_x": 0, "_y": 1}
 _HEADING_MARKS = re.compile(r"\s*\[[^\]]*\]$|\|")
 """Marks of a heading of the CSV besides the name: its unit, and bars of a size."""
-_ALONG = "F_"
-"""Begins the name of a force along the path of a point."""
 
 
 class Column(NamedTuple):
@@ -99,27 +97,26 @@ def read_column(solution: Solution, name: str) -> Column:
     if name in numbers:
         return _read_number(solution, name)
     points = ("A", "B", *solution.points)
-    velocities = {f"{_ALONG}{point}": f"v_{point}" for point in points}
+    # names of the forces along the paths of points
+    velocities = {f"F_{point}": f"v_{point}" for point in points}
     # the sign of a difference may also stand in the name of a point
-    words = name.split("-")
-    for count in range(1, len(words)):
-        parts = ["-".join(words[:count]), "-".join(words[count:])]
+    for sign in re.finditer("-", name):
+        parts = name[: sign.start()].strip(), name[sign.end() :].strip()
         named = map(str.strip, "/".join(parts).split("/"))
         if {*numbers, *velocities}.issuperset(named):
-            return _subtract(name, *(read_column(solution, x.strip()) for x in parts))
+            return _subtract(name, *(read_column(solution, part) for part in parts))
     above, divides, below = map(str.strip, name.partition("/"))
     if not divides:
         raise _refuse_name(solution, name)
-    if above in velocities and below not in {**numbers, **velocities}:
-        raise _refuse_name(solution, below)
     if above in velocities and below in velocities:
         # by virtual work the forces are as the speeds, the other way round
         above, below = velocities[below], velocities[above]
     of = solution
     if _is_velocity(above) and _is_velocity(below):
         of = _solve_at_unit_speed(solution)
-    numerator = _read_number(of, above)
+    # the name of a force alone is no column, whatever it is divided by
     denominator = _read_number(of, below)
+    numerator = _read_number(of, above)
     with np.errstate(all="ignore"):
         ratio = numerator.values / denominator.values
     ratio = np.where(np.isfinite(ratio), ratio, np.nan)

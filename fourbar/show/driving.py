@@ -9,16 +9,8 @@ from fourbar.quantities import COUPLE, LINE, UNITS, Array, DriveNames
 from fourbar.show.shown_units import drop_rounding
 from fourbar.solution import Solution
 
-_SAME_RATE = 1e-9
-"""Difference of two rates of a spline that is round-off, over its largest value. The
-rounding is that of its coefficients.
-"""
 _BESIDE = 1e-6
 """Part of a law's time from an instant at rest to where it is told how it moves."""
-_BEGINNING = 1e-100
-"""Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
-its sign.
-"""
 
 
 class Driving(NamedTuple):
@@ -28,8 +20,8 @@ class Driving(NamedTuple):
     symbol: str
     unit: str
     values: Array
-    """(n,); NaN where only positions are known, and of a released linkage, whose drive
-    does nothing.
+    """(n,); NaN where only positions are known, and along a released motion, in which
+    no drive acts.
     """
     error: Array
     """Error bars, (n,); NaN where none were computed."""
@@ -48,20 +40,20 @@ def read_drive_demand(solution: Solution) -> Driving:
     """Return torque or force of the drive, with its error bar."""
     names = COUPLE
     symbol = f"T{solution.drive_bar}"
-    word = "torque"
     speed = f"omega_{solution.drive_bar}"
     if solution.drive is not None:
         names = LINE
         symbol = "F"
-        word = "drive force"
         speed = "stroke_speed"
     values, error = (getattr(solution, name) for name in names[:2])
     none = np.full(solution.theta_2.shape, np.nan)
-    if values is None or solution.stated.motion.free is not None:
+    is_released = solution.stated.motion.free and solution.time is not None
+    if values is None or is_released:
         values = error = none
     if error is None:
         error = none
-    return Driving(word, symbol, UNITS[names.value], values, error, names, speed)
+    name = names.value.replace("_", " ")
+    return Driving(name, symbol, UNITS[names.value], values, error, names, speed)
 
 
 def lacks_friction(solution: Solution) -> Any:
@@ -108,7 +100,9 @@ def find_senses(solution: Solution) -> Array:
 
 def begin_to_move(speed: Any, senses: Any) -> Any:
     """Return speeds of which those that are 0 begin in a sense, 1 or -1; 0: none."""
-    return np.where(speed == 0.0, _BEGINNING * senses, speed)
+    # speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction
+    # has its sign
+    return np.where(speed == 0.0, 1e-100 * senses, speed)
 
 
 def leaves_range(solution: Solution) -> Any:
@@ -139,8 +133,10 @@ def is_once_round(solution: Solution) -> bool:
     if turns <= 0.5 or not np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0):
         return False
     rates = (solution.at.speed, solution.at.acceleration)
+    # difference of two rates of a spline that is round-off, over its largest value. The
+    # rounding is that of its coefficients
     return all(
-        abs(rate[-1] - rate[0]) <= _SAME_RATE * np.abs(rate).max()
+        abs(rate[-1] - rate[0]) <= 1e-9 * np.abs(rate).max()
         for rate in rates
         if isinstance(rate, np.ndarray) and rate.ndim
     )

@@ -17,9 +17,10 @@ from fourbar.formulas.torque import inertia
 from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import JAMMED, WOUND, Array
 from fourbar.scene import Command, Scene, find_signs
-from fourbar.show.driving import is_once_round, read_drive_demand
+from fourbar.show.driving import is_once_round, name_places, read_drive_demand
 from fourbar.show.motion_curves import MotionCurves, describe_motion, find_largest
 from fourbar.solution import Conversion, Solution, find_unit_in
+from fourbar.studies.paths import measure_paths
 
 
 class BearingLoad(NamedTuple):
@@ -168,7 +169,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     and None where they grow without bound. Those of a list or of a released motion are
     of the positions that have a value.
     """
-    if not isinstance(pin, str) or pin not in PIN_FORCE:
+    if pin not in [*PIN_FORCE]:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
     name = PIN_FORCE[pin]
     motion = _describe_loads(solution)
@@ -295,6 +296,16 @@ def convert(
         if number is None
         else np.multiply(number, find_unit_in(unit, units)[1]).tolist()
         for number, (name, unit) in zip(numbers, si.items(), strict=False)
+    }
+
+
+def collect_paths(solution: Solution, units: Conversion) -> dict[str, Any]:
+    """Collect the paths as the JSON has them, by the name of the point."""
+    _, place = name_places(solution)
+    lengths = dict.fromkeys(("x", "y", "straightness", "stroke"), "m")
+    si = {**lengths, "direction": "rad", "ends": place}
+    return {
+        name: convert(path, si, units) for name, path in measure_paths(solution).items()
     }
 
 

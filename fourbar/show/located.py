@@ -25,8 +25,6 @@ from fourbar.studies.passing import (
     is_same_position,
 )
 
-JUMP = 1e-3
-"""Part of its change over an interval by which a column jumps at one place in it."""
 TOUCHES = 1e-9
 """Part of a column's extent by which an extreme may miss the value: where it has a
 corner, it is located to the root of round-off.
@@ -215,7 +213,8 @@ class _LocatedSearch:
         root = find_root(self._gap, interval, args=(value,))
         change = np.abs(after - before)[rows]
         left = np.abs(root.f_bracket[1] - root.f_bracket[0])
-        steady = (root.f_x == 0.0) | (left <= JUMP * change)
+        # part of its change over an interval by which a column jumps at one place in it
+        steady = (root.f_x == 0.0) | (left <= 1e-3 * change)
         # at a pole itself there is no value
         jumps = np.mean(root.bracket, axis=0)[~steady]
         return root.x[steady], jumps

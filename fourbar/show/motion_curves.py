@@ -50,20 +50,9 @@ commanded.
 """
 _SAME_EDGE = 1e-9
 """Part of the motion within which two ends of panels are one."""
-_BESIDE_A_BREAK = 1e-6
-"""Part of the motion from a break to where its sides are shown. A law that comes to
-rest by a square still moves there.
-"""
 _BESIDE_A_POLE = 1e-4
 """Distance from a listed position without a lever at which its forces are compared with
 those at a quarter of it, rad. Positions have some 12 digits there.
-"""
-_POSITION_CURVES = ("theta_2", "theta_3", "theta_4", "sin_mu")
-_NO_BENDING = 1e-13
-"""Bending moment that is round-off, over the pin forces times the longest bar."""
-_HALF_A_TURN = 1e-6
-"""Part by which half a turn between two ranges of angles may be more, and is no turn.
-An end in its last digits leaves some 1e-8.
 """
 _Named = list[tuple[float, str]]
 """Places with the name of what happens there."""
@@ -119,7 +108,9 @@ class MotionCurves:
             return self.solution
         peaks = map(self.find_peak, panels.curves)
         tops = [peak.place for peak in peaks if math.isfinite(peak.value)]
-        away = _BESIDE_A_BREAK * panels.length
+        # part of the motion from a break to where its sides are shown. A law that comes
+        # to rest by a square still moves there
+        away = 1e-6 * panels.length
         stated = self.solution.at.places
         found = np.concatenate([tops, self.breaks - away, self.breaks + away])
         places = np.union1d(stated, np.clip(found, stated.min(), stated.max()))
@@ -187,12 +178,11 @@ class MotionCurves:
         way = self.started[0]
         if way is self:
             return Peak(math.nan, math.nan)
-        panels = way.panels
-        if not panels.located:
+        if not way.panels.located:
             at = self.solution.at
             starts = find_senses(self.solution)[0] * at.acceleration > 0.0
-            panels = panels.leave_out(~starts)
-        return panels.find_peak(read_drive_demand(self.solution).keys.value)
+            way = replace(way, panels=way.panels.leave_out(~starts))
+        return way.find_peak(read_drive_demand(self.solution).keys.value)
 
     @property
     def is_steady(self) -> bool:
@@ -212,8 +202,15 @@ class MotionCurves:
         return abs(float(motion.speed or 0.0))
 
     def find_peak(self, name: str) -> Peak:
-        """Find the largest size of a curve, as `Panels.find_peak` does."""
-        return self.panels.find_peak(name)
+        """Find the largest size of a curve.
+
+        The size is infinite, at the first pole, if the curve grows without bound, and
+        NaN if it has none.
+        """
+        if self.panels.has_value(name):
+            return self.panels.find_peak(name)
+        poles = [*self.panels.list_poles(name), math.nan]
+        return Peak(math.inf if poles[1:] else math.nan, poles[0])
 
     def find_rms(self, name: str) -> float:
         """Return the RMS value of a curve; NaN if it has none."""
@@ -443,7 +440,10 @@ def _list_position_curves(solution: Solution) -> Curves:
     A commanded angle has a value where the linkage does not assemble, too.
     """
     asked = Wanted(SHOWN_AS_ZERO, ranged=True)
-    curves = {name: (getattr(solution, name), asked) for name in _POSITION_CURVES}
+    curves = {
+        name: (getattr(solution, name), asked)
+        for name in ("theta_2", "theta_3", "theta_4", "sin_mu")
+    }
     if solution.stroke is not None:
         stroke = where_assembled(solution, solution.stroke)
         asked = Wanted(
@@ -536,7 +536,8 @@ def compute_bending(solution: Solution) -> dict[int, Bending]:
     for bar in MOVING_BARS:
         largest = largest_bending(scene, solution, bar)
         # a two-force bar has none
-        is_round_off = np.abs(largest.moment) <= _NO_BENDING * size
+        # bending moment that is round-off, over the pin forces times the longest bar
+        is_round_off = np.abs(largest.moment) <= 1e-13 * size
         moment = np.where(is_round_off, 0.0, largest.moment)
         bending[bar] = largest._replace(moment=moment)
     return bending
@@ -608,6 +609,8 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
         ends = ends_of.get(numbers[stretch[0]], angles[stretches[0]])
         away = 0.5 * (ends.min() + ends.max()) - 0.5 * (part.min() + part.max())
         # half a turn away is no turn, whatever the rounding
-        angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * away / TURN)
+        # part by which half a turn between two ranges of angles may be more, and is no
+        # turn. An end in its last digits leaves some 1e-8
+        angles[stretch] += TURN * np.round((1.0 - 1e-6) * away / TURN)
         ends_of[numbers[stretch[0]]] = np.append(ends, angles[stretch])
     curve.values = angles.reshape(curve.values.shape)

@@ -7,7 +7,6 @@ narrow to matter. Towards a pole the values grow with each halving: such a curve
 largest value and no integral.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -265,13 +264,8 @@ class Panels:
     def find_peak(self, name: str, rank: Callable[[Array], Array] = np.abs) -> Peak:
         """Find the value of a curve that ranks highest: that of the largest size.
 
-        Of equal ones it is the first. A signed curve keeps the sign of its value. The
-        value is infinite, at the first pole, if the curve grows without bound, and NaN
-        if it has none.
+        Of equal ones it is the first. A signed curve keeps the sign of its value.
         """
-        if not self.has_value(name):
-            poles = [*self.list_poles(name), math.nan]
-            return Peak(math.inf if poles[1:] else math.nan, poles[0])
         curve = self.curves[name]
         sizes = curve.sizes
         at_nodes = np.where(np.isfinite(sizes), rank(sizes), -np.inf)

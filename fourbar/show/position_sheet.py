@@ -24,8 +24,6 @@ from fourbar.solving import solve
 
 LABEL_WIDTH, _CELL = 15, 15
 """Width of a label and of a cell: four of them and a unit are 80 columns."""
-_NUMBER_LABEL = 22
-"""Width of the label of a number that stands alone."""
 ROUNDING_OF_PLACE = 2.0**-23
 """rad; to the root of round-off the place of a largest value is located, at which a
 rate is zero. A number that changes its sign within it is shown as zero.
@@ -186,7 +184,8 @@ class PositionSheet:
         unit = column.unit if column.divisor == "1" else "1"
         factor, shown = choose_unit(abs(number), unit, self.units)
         cell = write_cell(factor * number, _FORM)
-        return _write_row(label, [cell, "" if unit == "1" else shown], _NUMBER_LABEL)
+        # width of the label of a number that stands alone
+        return _write_row(label, [cell, "" if unit == "1" else shown], 22)
 
 
 def _write_row(label: str, cells: Iterable[str], width: int = LABEL_WIDTH) -> str:

@@ -38,8 +38,6 @@ FOLLOWING_UNITS = {"m/s": ("m", "{}/s"), "m/s^2": ("m", "{}/s^2"), "J": ("N m", 
 """Units that follow another one if not stated. Energy follows the unit of torque,
 speeds that of length.
 """
-_POUNDS = ("lb", "lbs", "pound", "pounds", "lbm")
-"""Names of the pound, a mass; a list that names no force may mean pounds-force."""
 COMMON: Conversion = {**DEGREES, "rad/s": ("rpm", 30.0 / math.pi)}
 """Units of a summary if no others are asked for. A unit that is left out is the SI unit
 with a prefix.
@@ -81,7 +79,8 @@ def units(text: str) -> Conversion:
             raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
-    if mass.casefold() in _POUNDS and "N" not in stated:
+    # names of the pound, a mass; a list that names no force may mean pounds-force
+    if mass.casefold() in ("lb", "lbs", "pound", "pounds", "lbm") and "N" not in stated:
         reason = "is a mass, and the list names no unit of force"
         raise InputError(
             "units",
@@ -94,14 +93,6 @@ def units(text: str) -> Conversion:
     return {
         unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()
     } or SI
-
-
-def units_of_length(length: str) -> Conversion:
-    """Return the units of messages on a length as it was typed.
-
-    Inches, feet and yards give imperial units; other lengths keep their unit.
-    """
-    return _suit_texts(length)
 
 
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:
@@ -129,7 +120,7 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
             rates.insert(0, "0 rad/s")
     except (LookupError, TypeError, AttributeError):
         return COMMON
-    return _suit_texts(length, *rates)
+    return units_of_length(length, *rates)
 
 
 def states_radians(document: Mapping[str, Any]) -> bool:
@@ -144,8 +135,11 @@ def states_radians(document: Mapping[str, Any]) -> bool:
 
 
 @cache
-def _suit_texts(length: str, *rates: str) -> Conversion:
-    """Return the units that suit a length, speeds and accelerations as written."""
+def units_of_length(length: str, *rates: str) -> Conversion:
+    """Return the units that suit a length, speeds and accelerations as written.
+
+    Inches, feet and yards give imperial units; other lengths keep their unit.
+    """
     from fourbar.quantities.units import IMPERIAL, converts, find_unit
 
     name = find_unit(length, "m")

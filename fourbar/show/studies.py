@@ -171,36 +171,39 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
         f"largest change over the positions {derivatives.describe_steps()};"
         " pin forces by their magnitude"
     ]
-    keys = [*derivatives.keys]
-    sizes = []
-    changes = np.zeros((len(keys), len(names)))
-    lacks = np.zeros(len(keys), dtype=bool)
-    for column, name in enumerate(names):
-        value = derivatives.value(name).reshape(len(solution), -1)
-        sizes.append(np.fmax.reduce(np.linalg.norm(value, axis=1)))
-        slopes = derivatives.by[name]
-        lacks |= np.isnan(slopes).reshape(len(keys), -1).any(axis=1)
-        if not np.isfinite(slopes).any():
-            changes[:, column] = np.nan
-        for row in derivatives.influences(name):
-            changes[keys.index(row.key), column] = row.change
+    shares: dict[str, float] = {}
+    largest = ["largest value"]
+    changes = []
+    for name in names:
+        value = derivatives.value(name)
+        sizes = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
+        size = float(np.nanmax(sizes)) if np.isfinite(sizes).any() else math.nan
+        largest.append(write_cell(size, ".4g"))
+        ranked = derivatives.influences(name)
+        for row in ranked:
+            share = abs(row.change) / size if size > 0.0 else 0.0
+            shares[row.key] = max(shares.get(row.key, 0.0), share)
+        no_change = 0.0 if np.isfinite(derivatives.by[name]).any() else math.nan
+        of_name = dict.fromkeys(derivatives.keys, no_change)
+        changes.append(of_name | {row.key: row.change for row in ranked})
     without = [status for status in derivatives.status if status != "ok"]
-    if without and lacks.any():
+    lacking = [
+        key
+        for row, key in enumerate(derivatives.keys)
+        if any(np.isnan(derivatives.by[name][row]).any() for name in names)
+    ]
+    if without and lacking:
         counts = ", ".join(
             f"{without.count(word)} {word.replace('_', ' ')}"
             for word in dict.fromkeys(without)
         )
-        by = f"derivatives by {', '.join(np.array(keys)[lacks])}"
-        if lacks.all():
-            by = "all derivatives"
+        by = "all derivatives"
+        if len(lacking) < len(derivatives.keys):
+            by = f"derivatives by {', '.join(lacking)}"
         lines.append(f"positions without {by}: {counts}")
-    with np.errstate(all="ignore"):
-        shares = np.nan_to_num(np.abs(changes) / sizes, posinf=0.0).max(axis=1)
-    rows = [["largest value", *(write_cell(size, ".4g") for size in sizes)]]
-    for row in np.argsort(-shares, kind="stable"):
-        if np.nan_to_num(changes[row]).any():
-            cells = (write_cell(change, ".3g") for change in changes[row])
-            rows.append([keys[row], *cells])
+    rows = [largest]
+    for key in sorted(shares, key=lambda key: -shares[key]):
+        rows.append([key, *(write_cell(of_name[key], ".3g") for of_name in changes)])
     heads = [f"{name}\n{find_unit_of_quantity(name)}" for name in names]
     width = width or BLOCK_WIDTH
     return write_table(solution.title, lines, ["", *heads], rows, width=width)
@@ -232,8 +235,6 @@ def write_sensitivity_json(derivatives: Sensitivity) -> str:
     )
 
 
-_WITHOUT_MOVE = (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND, CHANGE_POINT)
-"""Statuses at which no force says how a released linkage moves."""
 _MOVES = {0: "stays", 1: "theta_2 grows", -1: "theta_2 falls"}
 
 
@@ -368,7 +369,11 @@ def _write_holding(rest: Equilibria, units: Conversion, width: int | None) -> st
     for head, numbers in shown.items():
         columns[f"{head} ({unit})"] = write_cells(factor * numbers)
     moves = np.array([_MOVES[move] for move in rest.moves])
-    undecided = np.isin(positions.status_code, _WITHOUT_MOVE)
+    # statuses at which no force says how a released linkage moves
+    undecided = np.isin(
+        positions.status_code,
+        (NOT_ASSEMBLED, SINGULAR, NO_DIRECTION, WOUND, CHANGE_POINT),
+    )
     columns["released"] = np.where(undecided, positions.status, moves).tolist()
     rows = list(zip(*columns.values(), strict=True))
     every = math.ceil(len(positions) / MOST_ROWS_PRINTED)

@@ -31,13 +31,8 @@ from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.internal_forces import Bending
 
-_INSET = 1e-9
-"""Angle that is left out of a range at its limit positions, rad. These may not assemble
-as doubles.
-"""
 _BESIDE = 1e-6
 """Part of the motion from a change point to where a bending moment is read."""
-_STEPS_OF_RANGE = 48
 ZERO_TRANSMISSION_ANGLE = 1e-6
 """Transmission angle that counts as zero, rad. At a limit, a place in its last digits
 leaves some 1e-8.
@@ -159,7 +154,7 @@ class Facts:
 
     @cached_property
     def peak(self) -> Peak:
-        """Largest torque or force of the drive, signed, as `Panels.find_peak`."""
+        """Largest torque or force of the drive, as of `MotionCurves.find_peak`."""
         return self.motion.find_peak(self.drive.keys.value)
 
     @cached_property
@@ -269,8 +264,10 @@ class Facts:
             ranges = find_stroke_ranges(scene)
             return min(ranges, key=lambda ends: max(ends[0] - stroke, stroke - ends[1]))
         here = float(at.angle[first])
-        low, high = choose_range(scene.linkage, at.bar, here, _INSET)
-        sweep = {f"theta_{at.bar}": Sweep(low, high, _STEPS_OF_RANGE)}
+        # angle that is left out of a range at its limit positions, rad. These may not
+        # assemble as doubles
+        low, high = choose_range(scene.linkage, at.bar, here, 1e-9)
+        sweep = {f"theta_{at.bar}": Sweep(low, high, 48)}
         motion = Motion(**sweep, branch=int(at.branch[first]))  # type: ignore[arg-type]
         whole = solve(replace(scene, motion=motion, tolerances=()), "position")
         panels = describe_motion(whole).positions

@@ -120,7 +120,12 @@ def print_positions(
     for column in columns:
         cells |= _write_column(column, column.name, units)
     cells = cells or list_columns(solution, units)
-    kept = _fit_columns(cells, width)
+    widths = (
+        max(map(len, (*name.split("\n"), *column))) for name, column in cells.items()
+    )
+    needed = np.cumsum([GAP + each for each in widths]) - GAP
+    fitting = len(cells) if width is None else int((needed <= width).sum())
+    kept = [*cells][:fitting]
     rows = [*zip(*(cells[name] for name in kept), strict=True)]
     last = rows[-1:] if (len(rows) - 1) % step else []
     told = [] if solution.scene is None else list_arm_notes(solution.scene)
@@ -142,18 +147,6 @@ def print_positions(
     return write_table(
         solution.title, [], kept, shown, gap=gap, after=notes, width=width
     )
-
-
-def _fit_columns(cells: dict[str, list[str]], width: int | None) -> list[str]:
-    """List the first columns that a terminal of a width holds; None: all."""
-    needed = -GAP
-    kept: list[str] = []
-    for name, column in cells.items():
-        needed += GAP + max(len(cell) for cell in (*name.split("\n"), *column))
-        if width is not None and needed > width:
-            break
-        kept.append(name)
-    return kept
 
 
 def list_columns(

@@ -38,7 +38,6 @@ block.
 """
 _MOST_RUNS = 5
 """Intervals of theta_2, or of time, that one line names."""
-TOLERANCE_SCHEMA = "fourbar-tolerance/1"
 
 
 def list_shown_parts(spreads: Tolerances) -> list[str]:
@@ -283,7 +282,7 @@ def write_spreads_json(spreads: Tolerances) -> str:
     stated = spreads.scene.tolerances
     keys = [tolerance.key for tolerance in stated]
     return write_object(
-        TOLERANCE_SCHEMA,
+        "fourbar-tolerance/1",
         title=spreads.scene.title,
         samples=spreads.samples,
         seed=spreads.seed,

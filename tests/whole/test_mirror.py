@@ -39,7 +39,6 @@ fourbar/show/test_located.py | fourbar/studies: course
 fourbar/show/test_columns.py | derived
 fourbar/show/test_position_sheet.py | change_point
 fourbar/show/test_summary.py | driving motion_curves
-fourbar/studies/test_paths.py | fourbar/show: path_rows
 # parts of one document or picture
 fourbar/mjcf/test_mjcf.py | document model
 fourbar/show/test_animate.py | fourbar/show/plot: film
