@@ -153,7 +153,12 @@ class SceneBlock(Facts):
     def _list_paragraphs_of_position(self) -> list[Iterator[str]]:
         """List the paragraphs of one position: motion, forces, ratios."""
         sheet = PositionSheet(self.solution, self.units)
-        motion = chain([self._write_place()], self._write_statuses())
+        one = self.solution
+        place = self._value(float(one.at.stated[0][0]), one.at.unit)
+        at = f"at {one.commanded} = {place}"
+        if one.time is not None:
+            at += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
+        motion = chain([at], self._write_statuses())
         loads = [self._write_stroke()]
         if self.solution.F12 is not None and acts(self.scene):
             from_rest = self._list_from_rest(PIN_FORCES, "N")
@@ -170,15 +175,6 @@ class SceneBlock(Facts):
             chain(sheet.write_ratios(), self._write_static_hint()),
             self._write_remarks(),
         ]
-
-    def _write_place(self) -> str:
-        """Write what is commanded at the position, and its time along a motion."""
-        one = self.solution
-        place = self._value(float(one.at.stated[0][0]), one.at.unit)
-        text = f"at {one.commanded} = {place}"
-        if one.time is not None:
-            text += f", t = {self._value(float(one.time[0]), 's', 1.0)}"
-        return text
 
     def _value(
         self,
@@ -262,8 +258,7 @@ class SceneBlock(Facts):
         if counts[OK] == len(codes):
             return
         parts = [f"{counts[code]} {words[code]}" for code in np.flatnonzero(counts)]
-        total = write_count(len(codes), "position")
-        yield f"{total}: {', '.join(parts)}"
+        yield f"{write_count(len(codes), 'position')}: {', '.join(parts)}"
         # statuses of positions between which no forces exist either
         if self.has_forces and np.isin(codes, (WOUND, JAMMED, SEVERAL)).any():
             yield "    peaks and means are without the positions that have no forces"
@@ -333,14 +328,14 @@ class SceneBlock(Facts):
         if kind == "turn":
             begin = f"{name} turns fully"
         elif kind == "list":
-            count = write_count(len(self.solution), "position")
-            begin = f"{count} from {self._place(first)} to {stop}"
+            begin = write_count(len(self.solution), "position")
+            begin += f" from {self._place(first)} to {stop}"
         elif kind == "released":
             begin = self._write_release()
             following = [2, 4]
         elif kind == "law":
-            over = write_digits(last - first)
-            begin = f"{name} {self._write_swing(bar)} by a law over {over} s"
+            begin = f"{name} {self._write_swing(bar)} by a law over"
+            begin += f" {write_digits(last - first)} s"
         else:
             name = "stroke" if self.unit == "m" else name
             begin = f"{name} from {start} to {stop}"
@@ -357,16 +352,16 @@ class SceneBlock(Facts):
         width = high.value - low.value
         if self.kind == "turn" and width > 2.0 * math.pi - 1e-9:
             return "turns fully"
-        start = self._angle(low.value)
-        stop = self._angle(high.value)
+        start = f"from {self._angle(low.value)}"
+        stop = f"to {self._angle(high.value)}"
         if self.kind == "law" and bar == self.solution.at.bar:
-            return f"from {start} to {stop}"
+            return f"{start} {stop}"
         places = [self._place(end.place, named=False) for end in (low, high)]
         if self.unit == "rad":  # the unit stands next to it
             places = [place.split(_NBSP)[0] for place in places]
         return (
-            f"swings {self._angle(width)}, from {start}"
-            f" ({self.symbol}{_NBSP}={_NBSP}{places[0]}) to {stop} ({places[1]})"
+            f"swings {self._angle(width)}, {start}"
+            f" ({self.symbol}{_NBSP}={_NBSP}{places[0]}) {stop} ({places[1]})"
         )
 
     def _write_release(self) -> str:
@@ -380,8 +375,10 @@ class SceneBlock(Facts):
         last = max(np.flatnonzero(at.speed), default=0)  # the instant of the stop
         if last < len(at.time) - 1:
             place = self._value(float(self.solution.theta_2[-1]), "rad")
-            stop = write_digits(float(at.time[last]))
-            begin += f", at rest from t = {stop} s on, at theta_2{_NBSP}={_NBSP}{place}"
+            begin += (
+                f", at rest from t = {write_digits(float(at.time[last]))} s on,"
+                f" at theta_2{_NBSP}={_NBSP}{place}"
+            )
         if not self.solution.change_points:
             return begin
         instants = self.solution.change_points
@@ -399,7 +396,8 @@ class SceneBlock(Facts):
         if not self.drives:
             return
         yield self._write_drive_head()
-        yield _row("force" if self.linear else "torque", self._write_peak())
+        kind = "torque" if self.scene.drive is None else "force"
+        yield _row(kind, self._write_peak())
         if self.held and math.isfinite(self.peak.value):
             name = "at rest" if self.is_held_at_rest else "range"
             yield _row(name, self._write_held(self.drive.unit))
@@ -407,8 +405,8 @@ class SceneBlock(Facts):
         start = self.motion.start
         row = self._write_growth(self.drive.keys.value, *started)
         if math.isfinite(start.value):
-            value = self._value(start.value, self.drive.unit)
-            row = f"{value} at {self._place(start.place)}"
+            row = self._value(start.value, self.drive.unit)
+            row += f" at {self._place(start.place)}"
         if row and started[0] is not self.motion:
             yield _row("to start", f"{row}, against dry friction")
         yield from self._write_stroke()
@@ -429,8 +427,7 @@ class SceneBlock(Facts):
         rms = self._without_rounding(self.motion.find_rms(drive.keys.value))
         if math.isnan(rms):
             return row
-        mean = self._value(rms, drive.unit, largest, FAR_BELOW_PEAK)
-        return f"{row}, RMS {mean}"
+        return f"{row}, RMS {self._value(rms, drive.unit, largest, FAR_BELOW_PEAK)}"
 
     def _write_growth(self, name: str, *motions: MotionCurves) -> str:
         """Write where a quantity grows without bound, of this motion or of others.
@@ -464,8 +461,7 @@ class SceneBlock(Facts):
             holds = " to ".join(self._value(bound, unit, size) for bound in bounds)
             if ends is not None and len(self.solution) > 1:
                 first, last = ends
-                until = f" to {self._place(last, named=False)}"
-                over = f"over {self._place(first)}{until}"
+                over = f"over {self._place(first)} to {self._place(last, named=False)}"
                 holds += f" {f'at {self._place(first)}' if first == last else over}"
             parts.append(holds + ", a part of it at each position" * varies)
         return f"{', '.join(_shorten(parts))}: {rests}"
@@ -515,9 +511,9 @@ class SceneBlock(Facts):
                 torque = self._without_rounding(duty.mean_torque)
                 mean = self._value(torque, "N m", duty.peak_torque, FAR_BELOW_PEAK)
                 mean = f"mean torque {mean}; "
-            energy = self._value(duty.energy_swing, "J")
-            yield _row("cycle", f"{mean}energy swings by {energy} about the mean")
-        if not self.linear:
+            swing = f"{self._value(duty.energy_swing, 'J')} about the mean"
+            yield _row("cycle", f"{mean}energy swings by {swing}")
+        if self.scene.drive is None:
             yield f"motor: {self._write_motor_needs(duty)}"
 
     def _write_motor_needs(self, duty: MotorDuty) -> str:
@@ -526,15 +522,16 @@ class SceneBlock(Facts):
             word = "speed" if duty.peak_speed is None else "torque"
             return f"none is enough, as the {word} grows without bound"
         assert duty.peak_power is not None
-        torque = self._value(duty.peak_torque, "N m")
-        speed = self._value(duty.peak_speed, "rad/s")
         mean = ""
         if duty.rms_torque is not None:
             peak = duty.peak_torque
             rms = self._value(duty.rms_torque, "N m", peak, FAR_BELOW_PEAK)
             mean = f" (RMS {rms})"
-        power = self._write_peak_power(duty.peak_power)
-        return f"at least {torque} at {speed}{mean}, {power}"
+        return (
+            f"at least {self._value(duty.peak_torque, 'N m')} at"
+            f" {self._value(duty.peak_speed, 'rad/s')}{mean},"
+            f" {self._write_peak_power(duty.peak_power)}"
+        )
 
     def _write_peak_power(self, peak: float) -> str:
         """Write the largest power; if the drive brakes there, say what drives too."""
@@ -600,8 +597,7 @@ class SceneBlock(Facts):
         elif self.duty.peak_speed is None:
             row = self._write_growth("speed")
         else:
-            peak = self._value(self.duty.peak_speed, "m/s")
-            row = f"peak {peak}{self._of_positions}"
+            row = f"peak {self._value(self.duty.peak_speed, 'm/s')}{self._of_positions}"
         yield _row("speed", row)
 
     def _write_bore(self, pressure: float) -> Iterator[str]:
@@ -732,8 +728,8 @@ class SceneBlock(Facts):
         yield from self.motion.list_jumps(
             self.symbol, lambda place: self._place(place, named=False)
         )
-        pins_from_rest = self._list_from_rest(PIN_FORCES, "N")
-        if pins_from_rest or self._list_from_rest(_BENDING, "N m"):
+        of_pins = self._list_from_rest(PIN_FORCES, "N")
+        if of_pins or self._list_from_rest(_BENDING, "N m"):
             yield (
                 "to move: the largest as it starts or stops, with the whole of dry "
                 "friction; the rows above take friction at rest as 0"

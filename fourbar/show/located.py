@@ -134,13 +134,11 @@ class _LocatedSearch:
         self.places[rows] = located.x[located.success]
         self.values[rows] += (sides * located.f_x)[located.success]
         self.is_extreme[rows] = True
-        if self.name in COMMANDED_ANGLES and self.commanded in COMMANDED_ANGLES:
-            self._meet_limits(int(self.name[-1]), int(self.commanded[-1]))
-
-    def _meet_limits(self, bar: int, commanded: int) -> None:
-        """Move extremes of a bar's angle to its limits, which have a closed form."""
-        for limit in limit_positions(self.scene.linkage, bar):
-            away = self._wrap(self.places - limit[commanded - 2])
+        if not {self.name, self.commanded} <= {*COMMANDED_ANGLES}:
+            return
+        # the limits of a bar's angle have a closed form
+        for limit in limit_positions(self.scene.linkage, int(self.name[-1])):
+            away = self._wrap(self.places - getattr(limit, self.commanded))
             near = self.is_extreme & (np.abs(away) <= SAME_POSITION)
             self.places[near] -= away[near]
 
@@ -183,8 +181,8 @@ class _LocatedSearch:
             why = "no position has it"
             if jumps.size:
                 places = drop_rounding(np.sort(jumps), self.course.span).tolist()
-                jumped = [write_place(self.commanded, place) for place in places]
-                why = f"it jumps over it at {self.commanded} = {', '.join(jumped)}"
+                jumped = ", ".join(write_place(self.commanded, x) for x in places)
+                why = f"it jumps over it at {self.commanded} = {jumped}"
             raise self._refuse(text, why)
         found = np.sort(found)
         if self.places[0] > self.places[-1]:

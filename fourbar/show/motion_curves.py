@@ -336,7 +336,7 @@ def _mark_poles(solution: Solution, panels: Panels) -> None:
     scene = solution.scene
     rows = np.flatnonzero(np.isin(solution.status_code, (NO_LEVER, NO_TORQUE)))
     listed = scene.motion.free is None and not solution.at.moves_stroke
-    if solution.F12 is None or not listed or not rows.size:
+    if not listed or not rows.size:
         return
     at = solution.at.part(rows).as_doubles()
     beside = [

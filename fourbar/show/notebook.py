@@ -35,8 +35,8 @@ def show_scene(scene: Scene) -> str:
         text = dump(scene)
     except FourBarError as error:
         text = str(error)
-    name = classify(scene.linkage).name
-    return f"{picture}<b>{escape(name)}</b><pre>{escape(text)}</pre>"
+    name = escape(classify(scene.linkage).name)
+    return f"{picture}<b>{name}</b><pre>{escape(text)}</pre>"
 
 
 def show_solution(solution: Solution) -> str:

@@ -147,11 +147,6 @@ class Facts:
         F12 = self.solution.F12
         return F12 is not None and bool(np.isfinite(F12).any())
 
-    @property
-    def linear(self) -> bool:
-        """Return True if the drive exerts a force."""
-        return self.solution.drive is not None
-
     @cached_property
     def peak(self) -> Peak:
         """Largest torque or force of the drive, as of `MotionCurves.find_peak`."""

@@ -168,8 +168,13 @@ def list_columns(
         column = read_column(solution, name)
         shown |= _write_column(column, headings.get(name, name), units)
         if name == "sin_mu" and np.isfinite(drive.error).any():
-            digits = _count_digits(drive.sizes, drive.error)
-            shown[f"digits\nof {drive.symbol[0]}"] = digits
+            # digits of the torque that are not round-off; an error bar of 0 leaves all
+            with np.errstate(all="ignore"):
+                digits = np.floor(np.log10(drive.sizes / drive.error))
+            digits[drive.error == 0.0] = MOST_DIGITS
+            digits[~np.isfinite(drive.sizes + drive.error)] = np.nan
+            cells = write_cells(np.clip(digits, 0, MOST_DIGITS))
+            shown[f"digits\nof {drive.symbol[0]}"] = cells
     return shown
 
 
@@ -224,15 +229,6 @@ def write_cells(values: Array, form: str = ".6g") -> list[str]:
     # not the largest, which may stand beside a pole
     usual = float(np.percentile(sizes, 90.0)) if sizes.size else 0.0
     return [write_cell(value, form) for value in drop_rounding(values, usual).tolist()]
-
-
-def _count_digits(sizes: Array, error: Array) -> list[str]:
-    """Count the digits of the torque that are not round-off."""
-    with np.errstate(all="ignore"):
-        digits = np.clip(np.floor(np.log10(sizes / error)), 0, MOST_DIGITS)
-    digits[error == 0.0] = MOST_DIGITS
-    finite = np.isfinite(sizes) & np.isfinite(error)
-    return write_cells(np.where(finite, digits, np.nan))
 
 
 @contextmanager

@@ -153,11 +153,11 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     The last lines say where first order and samples part.
     """
     samples = spreads.samples
-    count = len(spreads.scene.tolerances)
-    tolerance = write_count(count, "tolerance")
-    positions = write_count(len(spreads.theta_2), "position")
-    drawn = f"{samples} samples ({spreads.describe_seed()})"
-    lines = [f"{tolerance}, {drawn}, {positions}"]
+    tolerance = write_count(len(spreads.scene.tolerances), "tolerance")
+    lines = [
+        f"{tolerance}, {samples} samples ({spreads.describe_seed()}),"
+        f" {write_count(len(spreads.theta_2), 'position')}"
+    ]
     reasons = {
         "have an impossible dimension, such as a length below 0": spreads.invalid,
         "do not assemble at some position at which the nominal linkage does": (

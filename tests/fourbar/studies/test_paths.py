@@ -7,8 +7,8 @@ from pytest import approx, mark
 
 from fourbar import solve, units
 from fourbar.files import loads
-from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.block import write_paths
+from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.studies.paths import measure_paths
 
 DRIVE = """\
