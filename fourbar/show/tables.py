@@ -128,25 +128,21 @@ def print_positions(
     kept = [*cells][:fitting]
     rows = [*zip(*(cells[name] for name in kept), strict=True)]
     last = rows[-1:] if (len(rows) - 1) % step else []
-    told = [] if solution.scene is None else list_arm_notes(solution.scene)
-    notes = [*told]
+    notes = list_arm_notes(solution.scene)
     if step > 1:
         more = "; --all shows each" if every is None else ""
         suffix = {1: "st", 2: "nd", 3: "rd"}.get(step % 10, "th")
         if step % 100 in (11, 12, 13):
             suffix = "th"
-        which = f"every {step}{suffix} of the {len(rows)} positions"
-        notes.append(f"shown: {which}{more}")
+        notes.append(f"shown: every {step}{suffix} of the {len(rows)} positions{more}")
     if left_out := [name.split("\n")[0] for name in cells if name not in kept]:
         notes.append(
             f"not shown: {', '.join(left_out)} (a wider terminal, --csv or --json has"
             " them)"
         )
     shown = rows[::step] + last
-    gap = GAP - 1
-    return write_table(
-        solution.title, [], kept, shown, gap=gap, after=notes, width=width
-    )
+    title = solution.title
+    return write_table(title, [], kept, shown, gap=GAP - 1, after=notes, width=width)
 
 
 def list_columns(
