@@ -440,9 +440,9 @@ def _write_positions(
         chosen = dict[str, Array]()
         for column in columns:
             # in units other than SI each heading names its unit
-            label = column.label(units)
+            label, values = column.convert(units)
             heading = f"{column.name} [{label}]" if units and label else column.name
-            chosen[heading] = column.shown(units)
+            chosen[heading] = values
         return write_csv(solution, units, decimal or ".", chosen)
     width = given.find_width(out)
     return print_positions(solution, width, units, every=every, columns=columns)

@@ -186,8 +186,8 @@ def _list_torsion_notes(solution: Solution, units: Conversion) -> list[str]:
         wound = np.ravel(winding)[0]
         shown = drop_rounding(np.array([rest + wound, wound]), 1.0).tolist()
         angle, by = map(write, shown)
-        line = lines[PINS[pin][0]]
-        notes.append(f"torsion spring at {pin}: wound by {by}, at {angle} from {line}")
+        spring = f"torsion spring at {pin}: wound by {by}"
+        notes.append(f"{spring}, at {angle} from {lines[PINS[pin][0]]}")
     return notes
 
 

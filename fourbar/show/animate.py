@@ -87,8 +87,17 @@ def collect_page_data(
     `midway`: the page opens in the middle of a motion, not at its beginning.
     """
     data = collect_live_data(scene, units, signs=(1, -1), midway=midway)
-    encoded = _encode_pictures(scene, pictures)
-    data["pictures"] = {str(bar): picture for bar, picture in encoded.items()}
+    encoded = {}
+    for name, path in pictures.items():
+        if name not in MOVING_BAR_NUMBERS:
+            allowed = f"must name one of {', '.join(MOVING_BAR_NUMBERS)}"
+            raise InputError("picture", name, allowed)
+        encoded[MOVING_BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
+    for picture in scene.pictures:
+        # those that are given replace them
+        if picture.bar not in encoded:
+            encoded[picture.bar] = picture.data_uri()
+    data["pictures"] = encoded
     data["tolerances"] = data["toml"] = None
     if scene.tolerances:
         places = data["over"]["values"] or data["theta_2"]
@@ -282,8 +291,7 @@ def _collect_columns(solution: Solution) -> dict[str, Any]:
         senses, _ = find_senses(solution)
         for end in {*drive.keys[2:]} & columns.keys():  # a start or stop is no range
             columns[end] = np.where(senses == 0.0, columns[end], np.nan)
-        sizes = drive.sizes
-        idle = sizes <= find_drive_rounding(solution)
+        idle = drive.sizes <= find_drive_rounding(solution)
         for name in {"torque", "power", "drive_force"} & columns.keys():
             columns[name] = np.where(idle, 0.0, columns[name])
     for name in DERIVED_NAMES:
@@ -307,26 +315,6 @@ def _drop_rounding(
     for name, numbers in zip(names, drop_rounding(kind, largest), strict=True):
         columns[name] = numbers.T
     return largest
-
-
-def _encode_pictures(
-    scene: Scene,
-    pictures: Mapping[str, str | Path],
-) -> dict[int, str]:
-    """Encode the pictures of the bars as data URIs.
-
-    Pictures that are given replace those of the scene.
-    """
-    encoded = {}
-    for name, path in pictures.items():
-        if name not in MOVING_BAR_NUMBERS:
-            named = ", ".join(MOVING_BAR_NUMBERS)
-            raise InputError("picture", name, f"must name one of {named}")
-        encoded[MOVING_BAR_NUMBERS[name]] = encode_picture(f"picture.{name}", path)
-    for picture in scene.pictures:
-        if picture.bar not in encoded:
-            encoded[picture.bar] = picture.data_uri()
-    return encoded
 
 
 ANIMATION_FORMATS = ("html", "gif", "mp4")

@@ -305,8 +305,8 @@ class SceneBlock(Facts):
             return
         if bar == 3 and classify(linkage).name == PARALLELOGRAM:
             yield "no theta_3 moves the parallelogram, whose coupler does not turn"
-        angles = " and ".join(map(self._angle, points))
-        line = f"change point{'s' if len(points) > 1 else ''} at theta_{bar} = {angles}"
+        line = f"change point{'s' if len(points) > 1 else ''} at theta_{bar} ="
+        line += f" {' and '.join(map(self._angle, points))}"
         if len(points) == 1 and turns_fully(linkage, bar):
             line += (
                 ": the assembly repeats after two turns, open and crossed are one "
@@ -379,14 +379,11 @@ class SceneBlock(Facts):
                 f", at rest from t = {write_digits(float(at.time[last]))} s on,"
                 f" at theta_2{_NBSP}={_NBSP}{place}"
             )
-        if not self.solution.change_points:
-            return begin
-        instants = self.solution.change_points
-        times = " and ".join(f"{write_digits(t)} s" for t in instants)
-        return (
-            f"{begin}; at t = {times} all bars are in line, where another motion is"
-            " possible"
-        )
+        instants = self.solution.change_points or ()
+        if times := " and ".join(f"{write_digits(t)} s" for t in instants):
+            begin += f"; at t = {times} all bars are in line, where another motion is"
+            begin += " possible"
+        return begin
 
     def _write_drive(self) -> Iterator[str]:
         """Write what drives: peak and mean, power and energy, and its needs.
@@ -764,8 +761,8 @@ class SceneBlock(Facts):
             return  # nothing has digits to lose
         worst = int(np.nanargmax(share))
         digits = max(math.floor(-math.log10(share[worst])), 0)
-        place = self._place(float(solution.at.places[worst]))
-        start = f"{digits} digits left of {drive.symbol} at {place}"
+        start = f"{digits} digits left of {drive.symbol} at"
+        start += f" {self._place(float(solution.at.places[worst]))}"
         commanded = BARS_IN_LINE[solution.at.bar]
         sines = {commanded: solution.condition[worst]}
         condition = solution.drive_condition[worst]

@@ -52,25 +52,21 @@ class Column(NamedTuple):
     component, (n,), and 1 of a pure number.
     """
 
-    def label(self, units: Conversion) -> str:
-        """Return the unit that the column is shown in; empty for a pure number."""
-        above, below = (
-            find_unit_in(unit, units)[0] for unit in (self.unit, self.divisor)
-        )
-        if above == below or (above, below) == ("1", "1"):
-            return ""
-        if below == "1":
-            return above
-        if " " in below or "/" in below:
-            return f"{above}/({below})"
-        return f"{above}/{below}"
+    def convert(self, units: Conversion) -> tuple[str, Array]:
+        """Return the unit that the column is shown in, and the values in it.
 
-    def shown(self, units: Conversion) -> Array:
-        """Return the values in the unit that they are shown in."""
-        above, below = (
-            find_unit_in(unit, units)[1] for unit in (self.unit, self.divisor)
-        )
-        return self.values * (above / below)
+        The unit is empty for a pure number.
+        """
+        above, factor = find_unit_in(self.unit, units)
+        below, divisor = find_unit_in(self.divisor, units)
+        values = self.values * (factor / divisor)
+        if above == below:
+            return "", values
+        if below == "1":
+            return above, values
+        if " " in below or "/" in below:
+            below = f"({below})"
+        return f"{above}/{below}", values
 
 
 def choose_columns(solution: Solution, names: str) -> list[Column]:
@@ -147,8 +143,9 @@ def _subtract(name: str, first: Column, second: Column) -> Column:
         raise InputError(
             "--columns",
             name,
-            f"{first.name} is in {first.label({}) or '1'} and {second.name} in"
-            f" {second.label({}) or '1'}: a difference is of two columns of one kind",
+            f"{first.name} is in {first.convert({})[0] or '1'} and {second.name} in"
+            f" {second.convert({})[0] or '1'}: a difference is of two columns of one"
+            " kind",
         )
     values = first.values - second.values
     if (first.unit, first.divisor) == ("rad", "1"):

@@ -277,7 +277,7 @@ def list_duty(solution: Solution, units: Conversion) -> dict[str, Any] | None:
     si = DUTY_UNITS if solution.drive is None else {**DUTY_UNITS, "peak_speed": "m/s"}
     of_pin = {"peak": "N", "rms": "N", "theta_2": "rad", "time": "s"}
     return {
-        "closed": duty is not None and duty.closed,
+        "closed": bool(duty and duty.closed),
         **convert((getattr(duty, name, None) for name in si), si, units),
         "pins": {
             pin: convert(bearing_load(solution, pin), of_pin, units)

@@ -86,7 +86,7 @@ class _LocatedSearch:
         )
         self.commanded = self.course.commanded
         column = read_column(self.course.solution, name)
-        self.unit = column.unit if column.label({}) else "1"
+        self.unit = column.unit if column.convert({})[0] else "1"
         """SI unit; that of a pure number is 1."""
         if "1" not in (self.unit, column.divisor):
             self.unit = f"({column.unit})/({column.divisor})"
@@ -242,9 +242,9 @@ class _LocatedSearch:
         if largest > UNBOUNDED_BEYOND * self.usual:
             return NotAssembledError(f"{start}, and grows without bound")
         unit = "" if self.unit == "1" else self.unit
-        extent = write_in_units(unit, *ends, between=" to ")
         word = "is" if len(ends) == 1 else "goes from"
-        return NotAssembledError(f"{start}; {self.name} {word} {extent}")
+        extent = f"{word} {write_in_units(unit, *ends, between=' to ')}"
+        return NotAssembledError(f"{start}; {self.name} {extent}")
 
 
 def write_place(name: str, place: float) -> str:

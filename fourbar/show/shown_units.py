@@ -71,28 +71,24 @@ def units(text: str) -> Conversion:
     stated: dict[str, str] = {}
     for name in _PRESETS.get(text.casefold(), text).replace(",", " ").split():
         unit = next((unit for unit in STATABLE_UNITS if converts(name, unit)), None)
-        if unit is None:
-            reason = f"is no unit of a result; {ALLOWED_UNITS}"
-            raise InputError("units", name, reason)
-        if unit in stated:
-            reason = f"is the second unit for {unit}"
-            raise InputError("units", name, f"{reason}; {ALLOWED_UNITS}")
+        if unit is None or unit in stated:
+            what = (
+                "no unit of a result" if unit is None else f"the second unit for {unit}"
+            )
+            raise InputError("units", name, f"is {what}; {ALLOWED_UNITS}")
         stated[unit] = name.replace(".", " ")
     mass = stated.get("kg", "")
     # names of the pound, a mass; a list that names no force may mean pounds-force
     if mass.casefold() in ("lb", "lbs", "pound", "pounds", "lbm") and "N" not in stated:
-        reason = "is a mass, and the list names no unit of force"
-        raise InputError(
-            "units",
-            mass,
-            f"{reason}: write lbf for pounds-force, or both",
+        reason = (
+            "is a mass, and the list names no unit of force: write lbf for"
+            " pounds-force, or both"
         )
+        raise InputError("units", mass, reason)
     for unit, (base, form) in FOLLOWING_UNITS.items():
         if base in stated and unit not in stated:
             stated[unit] = form.format(stated[base])
-    return {
-        unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()
-    } or SI
+    return {unit: (name, to_si(f"1 {unit}", name)) for unit, name in stated.items()}
 
 
 def units_of_scene(document: Mapping[str, Any]) -> Conversion:

@@ -57,7 +57,8 @@ def write_type(
 ) -> Iterator[str]:
     """Write the type of a linkage and the condition that decides it.
 
-    Further lines say which bars turn, how far, and between which limits.
+    Further lines say which bars turn, how far, and between which limits. Angles are in
+    deg, with the digits that a drawing needs.
 
     `units`: of the lengths, which may be ratios. `everything`: limits of the coupler
     too.
@@ -75,43 +76,8 @@ def write_type(
     yield mobility.name
     yield f"s + l = {write(outer)} {relation} p + q = {write(inner)}"
     yield f"bars that turn fully: {turning or 'none'}"
-    if mobility.barker is not None:  # a structure does not move
-        yield from _write_mobility(linkage, everything)
-
-
-def write_type_json(linkage: FourBar) -> str:
-    """Write the type as JSON in SI units and radians, null for no value.
-
-    Positions are as `LimitPosition` has them.
-    """
-    mobility = classify(linkage)
-    more = dict[str, object]()
-    if mobility.barker is not None:
-        transmission = transmission_extremes(linkage)
-        more = {
-            "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
-            "limit_positions": {
-                BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS
-            },
-            "change_points": change_points(linkage),
-            "circuits": circuits(linkage),
-            "transmission": {**transmission._asdict(), "worst": transmission.worst},
-            "time_ratio": time_ratio(linkage),
-        }
-    lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
-    return write_object(
-        "fourbar-classify/1",
-        lengths=lengths,
-        **mobility._asdict(),
-        **more,
-    )
-
-
-def _write_mobility(linkage: FourBar, everything: bool) -> Iterator[str]:
-    """Write what swings and turns, and between which limits.
-
-    Angles are in deg, with the digits that a drawing needs.
-    """
+    if mobility.barker is None:  # a structure does not move
+        return
     swings = [
         f"{BAR_NAMES[bar]} {_write_angle(swing(linkage, bar))}"
         for bar in MOVING_BARS
@@ -148,6 +114,34 @@ def _write_mobility(linkage: FourBar, everything: bool) -> Iterator[str]:
         yield f"smallest transmission angle: {_write_angle(transmission.worst)}"
     if (ratio := time_ratio(linkage)) is not None:
         yield f"time ratio of the output strokes at constant omega_2: {ratio:.4f}"
+
+
+def write_type_json(linkage: FourBar) -> str:
+    """Write the type as JSON in SI units and radians, null for no value.
+
+    Positions are as `LimitPosition` has them.
+    """
+    mobility = classify(linkage)
+    more = dict[str, object]()
+    if mobility.barker is not None:
+        transmission = transmission_extremes(linkage)
+        more = {
+            "swing": {BAR_NAMES[bar]: swing(linkage, bar) for bar in MOVING_BARS},
+            "limit_positions": {
+                BAR_NAMES[bar]: limit_positions(linkage, bar) for bar in MOVING_BARS
+            },
+            "change_points": change_points(linkage),
+            "circuits": circuits(linkage),
+            "transmission": {**transmission._asdict(), "worst": transmission.worst},
+            "time_ratio": time_ratio(linkage),
+        }
+    lengths = dict(zip(BAR_NAMES.values(), linkage.lengths, strict=True))
+    return write_object(
+        "fourbar-classify/1",
+        lengths=lengths,
+        **mobility._asdict(),
+        **more,
+    )
 
 
 def _write_angle(angle: float) -> str:
@@ -419,7 +413,7 @@ def _write_degrees(angle: float) -> str:
 def write_equilibria_json(title: str, rest: Equilibria) -> str:
     """Write equilibria as one JSON object, SI and rad."""
     positions = rest.positions
-    keys = read_drive_demand(rest.positions).keys
+    keys = read_drive_demand(positions).keys
     return write_object(
         "fourbar-equilibrium/1",
         title=title,

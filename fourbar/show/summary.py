@@ -182,6 +182,7 @@ class Facts:
         motion = self.motion
         peaks = {bar: motion.find_peak(f"bending_{bar}") for bar in MOVING_BARS}
         located = {}
+        coarse = dict[int, Bending]()
         for bar, peak in peaks.items():
             solution = self.solution
             if motion.panels.located and math.isfinite(peak.value):
@@ -191,14 +192,11 @@ class Facts:
                 solution = motion.solve_at(places)
                 bending = compute_bending(solution)[bar]
             else:
-                bending = self._bending_at_positions[bar]
+                coarse = coarse or compute_bending(solution)
+                bending = coarse[bar]
             row = int(np.argmax(np.nan_to_num(np.abs(bending.moment), nan=-1.0)))
             located[bar] = BarBending(peak, float(bending.x[row]), solution, row)
         return located
-
-    @cached_property
-    def _bending_at_positions(self) -> dict[int, Bending]:
-        return compute_bending(self.solution)
 
     @cached_property
     def held(self) -> list[HeldRange]:

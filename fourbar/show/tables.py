@@ -180,8 +180,8 @@ def _write_column(
     """Write the cells of a column, by its heading with the unit."""
     column = column._replace(values=drop_rounding(column.values, column.size))
     form = ".4f" if column.unit == "rad" else ".6g"  # angles line up at the point
-    cells = write_cells(column.shown(units), form)
-    return {f"{heading}\n{column.label(units)}": cells}
+    unit, values = column.convert(units)
+    return {f"{heading}\n{unit}": write_cells(values, form)}
 
 
 def _list_names(solution: Solution) -> Iterator[str]:

@@ -214,11 +214,10 @@ def _name_positions(spreads: Tolerances, rows: Indices, units: Conversion) -> st
         )
         for run in runs
     ]
-    places = ", ".join(ends[:_MOST_RUNS])
     if len(ends) > _MOST_RUNS:
-        places += ", ..."
+        ends[_MOST_RUNS:] = ["..."]
     positions = write_count(len(spreads.theta_2), "position")
-    return f"{rows.size} of {positions} ({name} = {places} {unit})"
+    return f"{rows.size} of {positions} ({name} = {', '.join(ends)} {unit})"
 
 
 def collect_tolerances(

@@ -52,8 +52,8 @@ def test_a_ratio_of_forces_has_a_unit_where_the_two_differ():
     s = solve(TURN)
     torque, ratio = choose_columns(s, "torque/F12,F12/F14")
     assert ratio.values == approx(np.hypot(*s.F12.T) / np.hypot(*s.F14.T))
-    assert torque.label({}) == "N m/N" and ratio.label({}) == ""
-    assert torque.shown({"N m": ("N mm", 1e3)}) == approx(1e3 * torque.values)
+    assert torque.convert({})[0] == "N m/N" and ratio.convert({})[0] == ""
+    assert torque.convert({"N m": ("N mm", 1e3)})[1] == approx(1e3 * torque.values)
     at_A = TURN.linkage.input.length * np.abs(s.omega_2)
     (along,) = choose_columns(s, "F_A/F_P")
     assert along.values == approx(np.hypot(*s.velocity["P"].T) / at_A)
