@@ -117,8 +117,8 @@ class LengthsCommand(click.Command):
             if not re.search(r"extra arguments? \([\d.]|takes 4 values", message):
                 raise
             if message.endswith("values"):
-                names = ", ".join(LENGTH_NAMES)
-                message += f", {names} (fourbar analyze takes a scene file)"
+                message += f", {', '.join(LENGTH_NAMES)}"
+                message += " (fourbar analyze takes a scene file)"
             raise click.UsageError(f"{message}: {ELSEWHERE}", ctx) from None
 
 

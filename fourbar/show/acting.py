@@ -81,13 +81,11 @@ def list_drawn_notes(scene: Scene, units: Conversion) -> list[str]:
     width = abs(other - drawn)
     if width - abs(away) < SAME_POSITION or abs(away) < SAME_POSITION:
         return []
-    swept, start, stop, nearer, gap = (
-        write_short(angle, "rad", units)
-        for angle in (width, sweep.start, sweep.stop, drawn + away, abs(away))
-    )
+    write = partial(write_short, unit="rad", units=units)
     return [
-        f"{scene.motion.commanded} goes by {swept} from {start} to {stop}; {key} ="
-        f' "{nearer}" is the same direction, {gap} from the drawn one'
+        f"{scene.motion.commanded} goes by {write(width)} from {write(sweep.start)} to"
+        f' {write(sweep.stop)}; {key} = "{write(drawn + away)}" is the same'
+        f" direction, {write(abs(away))} from the drawn one"
     ]
 
 
@@ -108,14 +106,12 @@ def _list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     ends = np.linspace(t[[0, -2]], t[[1, -1]], 33).ravel()
     pairs = zip(law.at(ends), replace(law, ends=other).at(ends), strict=True)
     angle, _, acceleration = (float(np.abs(one - two).max()) for one, two in pairs)
-    by = " and ".join(
-        write_short(size, unit, units)
-        for size, unit in ((angle, "rad"), (acceleration, "rad/s^2"))
-    )
     assumed = "as the next intervals bend" if law.ends == "free" else "at rest"
     return [
         f'the law begins and ends {assumed} (ends = "{law.ends}"); "{other}" changes'
-        f" angle and acceleration of its first and last intervals by up to {by};"
+        f" angle and acceleration of its first and last intervals by up to"
+        f" {write_short(angle, 'rad', units)} and"
+        f" {write_short(acceleration, 'rad/s^2', units)};"
         f" omega_{law.bar} beside theta_{law.bar} states the speeds"
     ]
 
@@ -149,10 +145,10 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
                 write_stretch(motion, stretch, units)
                 for stretch in list_stretches(beyond, motion.at.places)
             )
-            length = write_short(end, "m", units)
             said = (
-                f", a gas spring, is {is_there} length of {length} {where}: it is taken"
-                " to push on, and has no stops"
+                f", a gas spring, is {is_there} length of"
+                f" {write_short(end, 'm', units)} {where}: it is taken to push on, and"
+                " has no stops"
             )
             if not is_there:
                 said = (

@@ -51,6 +51,7 @@ from fourbar.show.plot.view import (
     set_branch,
 )
 from fourbar.show.shown_units import choose_unit, drop_rounding
+from fourbar.show.tables import show_running
 from fourbar.show.tolerances import collect_tolerances
 from fourbar.solution import SI, Conversion, Solution
 from fourbar.solving import solve
@@ -101,7 +102,8 @@ def collect_page_data(
     data["tolerances"] = data["toml"] = None
     if scene.tolerances:
         places = data["over"]["values"] or data["theta_2"]
-        data["tolerances"] = collect_tolerances(scene, places)
+        with show_running("the samples of the tolerances are solved") as progress:
+            data["tolerances"] = collect_tolerances(scene, places, progress)
     with suppress(InputError):  # a file has no form of what acts
         data["toml"] = dump(scene)
     plain: dict[str, Any] = null_nan(data)

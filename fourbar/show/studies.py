@@ -169,9 +169,8 @@ def write_sensitivity(derivatives: Sensitivity, width: int | None) -> str:
     largest = ["largest value"]
     changes = []
     for name in names:
-        value = derivatives.value(name)
-        sizes = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-        size = float(np.nanmax(sizes)) if np.isfinite(sizes).any() else math.nan
+        value = derivatives.value(name).reshape(len(solution), -1)
+        size = float(np.fmax.reduce(np.linalg.norm(value, axis=1)))
         largest.append(write_cell(size, ".4g"))
         ranked = derivatives.influences(name)
         for row in ranked:

@@ -5,7 +5,6 @@ Every row of the table is of the place where the spread is largest.
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +17,7 @@ from fourbar.scene import Scene
 from fourbar.show.lines import BLOCK_WIDTH
 from fourbar.show.panels import split_runs
 from fourbar.show.shown_units import drop_rounding, write_cell
-from fourbar.show.tables import show_running, write_table
+from fourbar.show.tables import write_table
 from fourbar.solution import DEGREES, Conversion, find_unit_in
 from fourbar.studies.spread import (
     BAND_PERCENTILES,
@@ -166,8 +165,8 @@ def _describe_counts(spreads: Tolerances, units: Conversion = DEGREES) -> list[s
     }
     for why, lost in reasons.items():
         if lost:
-            share = 100.0 * lost / samples
-            lines.append(f"{lost} of {samples} samples ({share:.3g} %) {why}")
+            share = f"({100.0 * lost / samples:.3g} %)"
+            lines.append(f"{lost} of {samples} samples {share} {why}")
     for part in list_shown_parts(spreads):
         lines += describe_parted(spreads, part, units)
     return lines
@@ -223,24 +222,20 @@ def _name_positions(spreads: Tolerances, rows: Indices, units: Conversion) -> st
 def collect_tolerances(
     scene: Scene,
     places: list[float],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None,
 ) -> dict[str, Any]:
     """Collect what a page shows of tolerances at places of its axis.
 
     Deviations from the nominal and shares of the variance are collected. A scene that
     has none of this (a free motion, SciPy not installed) gives the sentence that says
-    so. `progress` is that of `tolerances`; left out, a line in the terminal.
+    so. `progress` is that of `tolerances`.
     """
     positions = scene
     if not scene.motion.law:
         motion = scene.motion.replace(angle=np.array(places))
         positions = replace(scene, motion=motion)
     try:
-        running: AbstractContextManager[Any] = nullcontext(progress)
-        if progress is None:
-            running = show_running("the samples of the tolerances are solved")
-        with running as line:
-            spreads = tolerances(positions, PAGE_SAMPLES, progress=line)
+        spreads = tolerances(positions, PAGE_SAMPLES, progress=progress)
     except (InputError, DependencyError) as error:
         return {"lines": [str(error)], "parts": {}}
     # a law is thinned as in `animate`
