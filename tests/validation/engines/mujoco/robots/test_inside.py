@@ -15,6 +15,7 @@ from pytest import approx
 from scipy.optimize import bisect
 
 import fourbar
+from fourbar.errors import LimitError
 from fourbar.files import load
 from fourbar.mjcf import write_mjcf
 from fourbar.scene import Command
@@ -289,6 +290,14 @@ def test_a_loop_drawn_in_line_goes_on_in_the_assembly_of_the_branch(
     if branch == CROSSED:
         wanted = mirror(wanted, moved, 0.25 if bar == 2 else 0.0)
     assert follows == approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize("speed, reason", [(2.0, "must be 1 to"), (0.0, "to rest")])
+def test_one_position_is_no_motion_through_time(speed, reason):
+    inside, _ = open_loop("finger")
+    motion = make_motion([inside.loop.angles[1]], (speed, 0.0))
+    with pytest.raises(LimitError, match=reason):
+        inside.answer_through_time(motion)
 
 
 def test_a_torque_meets_the_stops_of_the_file_after_a_motion_too():

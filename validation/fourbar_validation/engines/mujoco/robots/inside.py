@@ -686,8 +686,9 @@ class LoopInside:
                 " motion through time"
             )
         _, omega, alpha = motion[0].tolist()
-        start, *_, stop = angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
-        instants = [*map(WindowMotion(start, stop, omega, alpha).time, angles)]
+        angles = sorted(motion[:, 0].tolist(), reverse=omega < 0.0)
+        run = WindowMotion(angles[0], angles[-1], omega, alpha)
+        instants = [*map(run.time, angles)]
         timestep = self.model.opt.timestep
         steps = instants[-1] / timestep
         if not 1.0 <= steps <= MOST_TIMESTEPS:
@@ -695,7 +696,7 @@ class LoopInside:
                 f"its timestep of {timestep:g} s makes {steps:.3g} steps of the motion;"
                 f" must be 1 to {MOST_TIMESTEPS}: --speed states another speed"
             )
-        return start, instants
+        return angles[0], instants
 
     def _keep_speeds(self) -> tuple[mujoco.MjModel, float]:
         """Return a model whose armatures keep speeds, and that of the commanded bar."""
