@@ -1,6 +1,6 @@
 """Every quantity of linkages, commands, drives and effects against 320-bit balls.
 
-Thirteen equations and a loop closed by a quadratic share nothing with the formulas.
+Newton-Euler equations and a loop closed by a quadratic share nothing with the formulas.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Thirteen equations in 320-bit balls, which share nothing with the formulas."""
+"""Newton-Euler equations in 320-bit balls, which share nothing with the formulas."""
 
 import numpy as np
 from flint import arb, ctx

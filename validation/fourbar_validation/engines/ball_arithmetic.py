@@ -1,6 +1,6 @@
 """Solve the scene in 320-bit ball arithmetic as an engine.
 
-The loop is a quadratic, and all thirteen equations are solved.
+The loop is a quadratic, and nine Newton-Euler equations are solved as one system.
 """
 
 from itertools import product
@@ -74,7 +74,7 @@ class BallArithmetic:
             shared=SHARED_BY_EXACT_ENGINES,
             own=(
                 "closure as a complex quadratic, linear speeds and accelerations,"
-                " thirteen Newton-Euler equations"
+                " nine Newton-Euler equations"
             ),
         )
 

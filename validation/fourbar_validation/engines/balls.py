@@ -3,8 +3,8 @@
 Every output of `solve` has 50 digits and a rigorous radius. Shares nothing with the
 formulas: the loop is closed by the complex quadratic in e^{i theta_3}, the velocities
 and accelerations come from the linear systems of the differentiated loop, the pin
-forces and the torque from the full thirteen Newton-Euler equations about the mass
-centres.
+forces and the torque from the nine Newton-Euler equations of the bars about O2, as one
+system.
 """
 
 import math
@@ -19,7 +19,7 @@ from fourbar.effects import Load, Place, PointDrive, Table
 from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import find_centre, find_inertia, find_mass
-from fourbar_validation.engines.description import find_stated_lengths
+from fourbar_validation.engines.description import FORCE_BETWEEN, find_stated_lengths
 
 Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any
@@ -62,35 +62,11 @@ COMMANDED_FIRST = {
     4: ("c", "b", "a"),
 }
 """Lengths of the commanded bar and of the two others, by the commanded bar."""
-FORCE_COLUMNS = {"F12": 0, "F32": 2, "F43": 6, "F14": 8}
-"""Columns of the unknown pin forces; each bar has those at its first and at its second
-pin, and that of the drive is the last.
-"""
-REACTIONS = ((2, 4), (3, 5), (6, 10), (7, 11))
-"""Columns of forces that are opposite: F32 and F23 at A, F43 and F34 at B, x and y."""
 STEP_BITS = 90
 """Sensitivities are difference quotients with a relative step of 2^-90: wrong by about
 2^-90 / (distance to the nearest singular position), and the cancelled 90 bits are there
 to lose.
 """
-
-
-def collect_inputs(scene: Scene, angle: float) -> BallValues:
-    """Collect the stored doubles that the outputs at one position depend on, as balls.
-
-    The position is of the commanded angle. What acts is evaluated once, with all bars
-    laid down along +x, and takes its numbers on the way.
-    """
-    link = scene.linkage
-    names = ("d", "a", "b", "c", "theta_1", *scene.motion.names)
-    omega, alpha = scene.motion.find_rates(np.array([angle]))
-    rates = (0.0 if rate is None else np.ravel(rate)[0] for rate in (omega, alpha))
-    stored = (*link.lengths, link.ground_angle, angle, *rates)
-    loop = _Loop(scene, dict(zip(names, map(arb, stored), strict=True)))
-    loop.pose(dict.fromkeys(MOVING_BARS, acb(1)))
-    loop.omega = loop.alpha = dict.fromkeys(loop.w, arb(0))
-    loop.sum_acting()
-    return loop.x
 
 
 def make_ball_lengths(linkage: FourBar) -> BallValues:
@@ -108,14 +84,25 @@ def make_ball_lengths(linkage: FourBar) -> BallValues:
 
 
 def make_balls(scene: Scene, angle: float, **motion: float) -> BallValues:
-    """Give the inputs as balls of no radius, and set the working precision.
+    """Return the stored doubles that the outputs at one position depend on, as balls.
 
-    omega_2 or alpha_2 are replaced where they are given.
+    The position is of the commanded angle; omega_2 or alpha_2 are replaced where they
+    are given. What acts is evaluated once, with all bars laid down along +x, and takes
+    its numbers on the way. The working precision is set.
     """
     ctx.prec = BITS
-    replaced = {name: arb(value) for name, value in motion.items()}
-    stated = make_ball_lengths(scene.linkage)
-    return collect_inputs(scene, angle) | replaced | stated
+    linkage = scene.linkage
+    inputs = make_ball_lengths(linkage) | {"theta_1": arb(linkage.ground_angle)}
+    rates = scene.motion.find_rates(np.array([angle]))
+    stored = angle, *(0.0 if rate is None else np.ravel(rate)[0] for rate in rates)
+    commanded = dict(zip(scene.motion.names, stored, strict=True)) | motion
+    for name, value in commanded.items():
+        inputs[name] = arb(value)
+    loop = _Loop(scene, inputs)
+    loop.pose(dict.fromkeys(MOVING_BARS, acb(1)))
+    loop.omega = loop.alpha = dict.fromkeys(loop.w, arb(0))
+    loop.sum_acting()
+    return loop.x
 
 
 def compute_directions(
@@ -195,12 +182,12 @@ def compute_outputs(
     _put_vectors(y, loop.points())
     unit = loop.evaluate_drive(y)
     try:
-        forces, driving = loop.solve_thirteen(unit)
+        forces, driving = loop.solve_forces(unit)
     except ZeroDivisionError:
         return y
     _put_vectors(y, forces)
     y["torque" if scene.drive is None else "drive_force"] = driving
-    y["power"] = driving * unit.power(loop.v_pin, loop.omega)
+    y["power"] = driving * loop.compute_power(unit, loop.omega)
     return y
 
 
@@ -212,35 +199,23 @@ def _put_vectors(y: BallValues, vectors: dict[str, ComplexBall]) -> None:
 
 
 class _Wrenches:
-    """Force, and moment about the mass centre, that act on each bar.
+    """Force, and moment about O2, that act on each bar. The ground bears all."""
 
-    The ground bears all. `centre`: vectors from the first pins to the mass centres.
-    """
+    def __init__(self) -> None:
+        bars = (1, *MOVING_BARS)
+        self.force: dict[int, ComplexBall] = dict.fromkeys(bars, acb(0))
+        self.moment: dict[int, Ball] = dict.fromkeys(bars, arb(0))
 
-    def __init__(self, centre: dict[int, ComplexBall]) -> None:
-        self.centre = centre
-        self.force: dict[int, ComplexBall] = dict.fromkeys(centre, acb(0))
-        self.moment: dict[int, Ball] = dict.fromkeys(centre, arb(0))
-
-    def push(self, bar: int, force: ComplexBall, arm: ComplexBall) -> None:
-        """Add a force at an arm from the first pin."""
+    def push(self, bar: int, force: ComplexBall, point: ComplexBall) -> None:
+        """Add a force at a point."""
         self.force[bar] += force
-        self.moment[bar] += wedge(arm - self.centre[bar], force)
+        self.moment[bar] += wedge(point, force)
 
     def twist(self, pin: str, couple: Ball) -> None:
         """Add a couple to bar j of a pin (i, j), its opposite to bar i."""
         i, j = PINS[pin]
         self.moment[j] += couple
         self.moment[i] -= couple
-
-    def power(self, v_pin: dict[int, ComplexBall], omega: dict[int, Ball]) -> Ball:
-        """Return the power at velocities of the first pins and angular speeds."""
-        total = arb(0)
-        for bar in MOVING_BARS:
-            velocity = v_pin[bar] + acb(0, omega[bar]) * self.centre[bar]
-            total += (self.force[bar].conjugate() * velocity).real
-            total += self.moment[bar] * omega[bar]
-        return total
 
     def components(self) -> list[Ball]:
         """List force and moment of the moving bars, nine balls."""
@@ -268,12 +243,9 @@ class _Loop:
     first_pin: dict[int, ComplexBall]
     """Places of the first pins."""
     centre: dict[int, ComplexBall]
-    """Vectors from the first pin to the mass centre."""
+    """Places of the mass centres."""
     omega: dict[int, Ball]
     alpha: dict[int, Ball]
-    v_pin: dict[int, ComplexBall]
-    a_pin: dict[int, ComplexBall]
-    """Velocities and accelerations of the first pins."""
 
     def __init__(self, scene: Scene, inputs: BallValues) -> None:
         self.scene = scene
@@ -356,17 +328,13 @@ class _Loop:
         self.tip = {2: x["a"] * w[2], 3: x["b"] * w[3], 4: x["c"] * w[4]}
         ground = polar_ball(x["d"], x["theta_1"])
         self.first_pin = {1: acb(0), 2: acb(0), 3: self.tip[2], 4: ground}
-        self.centre = {bar: w[bar] * self.to_centre[bar] for bar in MOVING_BARS}
-        self.centre[1] = acb(0)
+        centres = self.to_centre.items()
+        self.centre = {bar: self.locate((bar, offset)) for bar, offset in centres}
 
-    def lay(self, spots: list[Spot]) -> tuple[list[Spot], ComplexBall]:
-        """Return bar and arm from the first pin of each place.
-
-        The vector from the first place to the last is returned too.
-        """
-        arms = [(bar, self.w[bar] * offset) for bar, offset in spots]
-        places = [self.first_pin[bar] + arm for bar, arm in arms]
-        return arms, places[-1] - places[0]
+    def locate(self, spot: Spot) -> ComplexBall:
+        """Locate a place on a bar."""
+        bar, offset = spot
+        return self.first_pin[bar] + self.w[bar] * offset
 
     def move(self, commanded: int) -> None:
         """Move the bars: two linear systems of the differentiated loop."""
@@ -392,36 +360,49 @@ class _Loop:
         self.omega = rates(x[f"omega_{commanded}"], x.get("slip", zero))
         pull = sum((side[bar] * square(self.omega[bar]) for bar in MOVING_BARS), zero)
         self.alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + pull)
-        self.v_pin = dict.fromkeys(self.w, zero)
-        self.a_pin = dict.fromkeys(self.w, zero)
-        self.v_pin[3] = self.turn(2, self.tip[2])
-        self.a_pin[3] = self.swing(2, self.tip[2])
 
-    def turn(self, bar: int, arm: ComplexBall) -> ComplexBall:
-        """Return the velocity of a point of a bar against its first pin."""
-        return acb(0, self.omega[bar]) * arm
+    def velocity(self, omega: dict[int, Ball], spot: Spot) -> ComplexBall:
+        """Return the velocity of a point of a bar at angular speeds."""
+        bar, point = spot
+        v = acb(0, omega[bar]) * (point - self.first_pin[bar])
+        return v + acb(0, omega[2]) * self.tip[2] if bar == 3 else v
 
-    def swing(self, bar: int, arm: ComplexBall) -> ComplexBall:
-        """Return the acceleration of a point of a bar against its first pin."""
-        return acb(-self.omega[bar] * self.omega[bar], self.alpha[bar]) * arm
+    def acceleration(self, spot: Spot) -> ComplexBall:
+        """Return the acceleration of a point of a bar."""
+        bar, point = spot
+        turned = acb(-square(self.omega[bar]), self.alpha[bar])
+        a = turned * (point - self.first_pin[bar])
+        return a + self.acceleration((2, self.tip[2])) if bar == 3 else a
+
+    def compute_power(self, on: _Wrenches, omega: dict[int, Ball]) -> Ball:
+        """Compute the power of wrenches at angular speeds.
+
+        A wrench about O2 acts on the point of its bar that lies there.
+        """
+        total = arb(0)
+        for bar in MOVING_BARS:
+            velocity = self.velocity(omega, (bar, acb(0)))
+            total += (on.force[bar].conjugate() * velocity).real
+            total += on.moment[bar] * omega[bar]
+        return total
 
     def points(self) -> dict[str, ComplexBall]:
         """Return places, velocities and accelerations of the points, by name.
 
         The points are those that are answered.
         """
-        arms = {"A": (2, self.tip[2]), "B": (4, self.tip[4])}
-        arms |= {f"G{bar}": (bar, self.centre[bar]) for bar in MOVING_BARS}
+        spots = {"A": (2, self.tip[2]), "B": (4, self.first_pin[4] + self.tip[4])}
+        spots |= {f"G{bar}": (bar, self.centre[bar]) for bar in MOVING_BARS}
         points = {}
-        for name, (bar, arm) in arms.items():
-            points[name] = self.first_pin[bar] + arm
-            points[f"v_{name}"] = self.v_pin[bar] + self.turn(bar, arm)
-            points[f"a_{name}"] = self.a_pin[bar] + self.swing(bar, arm)
+        for name, spot in spots.items():
+            _, points[name] = spot
+            points[f"v_{name}"] = self.velocity(self.omega, spot)
+            points[f"a_{name}"] = self.acceleration(spot)
         return points
 
     def sum_acting(self) -> _Wrenches:
         """Sum what acts on each bar."""
-        on = _Wrenches(self.centre)
+        on = _Wrenches()
         for k, load in enumerate(self.scene.loads):
             self._add_load(on, load, k)
         for effect in self.scene.effects:
@@ -441,16 +422,14 @@ class _Loop:
         factor = self._interpolate(load.table, k) if load.table else 1
         on.moment[bar] += factor * moment
         if load.arm is not None:
-            to_force = self.polar(load.arm, f"at_{k}")
-            arm = self.centre[bar] + to_force
+            point = self.centre[bar] + self.polar(load.arm, f"at_{k}")
         elif load.force is not None:
             assert load.place is not None
-            _, offset = self.spot(load.place, f"at_{k}")
-            arm = self.w[bar] * offset
+            point = self.locate(self.spot(load.place, f"at_{k}"))
         else:
             return
         axes = self.w[bar] if load.frame == "bar" else 1
-        on.push(bar, factor * axes * force, arm)
+        on.push(bar, factor * axes * force, point)
 
     def _interpolate(self, table: Table, k: int) -> Ball:
         """Interpolate between the two points of a table that enclose theta_2.
@@ -513,8 +492,9 @@ class _Loop:
             stiffness = self.take(f"stiffness_{k}", spring.stiffness)
             length = self.take(f"length_{k}", spring.length)
             preload = self.take(f"pull_{k}", spring.preload)
-            ends = (spring.start, f"start_{k}"), (spring.end, f"end_{k}")
-            arms, across = self.lay([self.spot(*end) for end in ends])
+            start = self.locate(self.spot(spring.start, f"start_{k}"))
+            end = self.locate(self.spot(spring.end, f"end_{k}"))
+            across = end - start
             pull = stiffness * across
             # else the pull is k times the distance, wherever that ends
             if spring.preload != spring.stiffness * spring.length:
@@ -525,8 +505,8 @@ class _Loop:
                 elif spring.acts == "push":
                     tension = tension.min(arb(0))
                 pull = tension / distance * across
-            for (bar, arm), force in zip(arms, (pull, -pull), strict=True):
-                on.push(bar, force, arm)
+            on.push(spring.start.bar, pull, start)
+            on.push(spring.end.bar, -pull, end)
 
     def evaluate_drive(self, y: BallValues) -> _Wrenches:
         """Return what one N m or one N of the drive does to the bars.
@@ -536,66 +516,64 @@ class _Loop:
         - theta_4), (a/c) sin(theta_2 - theta_3)). L is the sum of what each end could
         move: r on bar 2, a + r a/b on bar 3, r a/c on bar 4.
         """
-        scene = self.scene
-        drive = scene.drive
-        unit = _Wrenches(self.centre)
+        drive = self.scene.drive
+        unit = _Wrenches()
         if drive is None:
-            y["drive_condition"] = abs(self.sines[scene.drive_bar])
-            unit.moment[scene.drive_bar] = arb(1)
+            driven = self.scene.drive_bar
+            y["drive_condition"] = abs(self.sines[driven])
+            unit.moment[driven] = arb(1)
             return unit
-        arms, line = self.lay(self.ends)
+        points = [self.locate(spot) for spot in self.ends]
         if isinstance(drive, PointDrive):
             line = polar_ball(arb(1), self.x["direction"])
             if drive.frame == "bar":
                 line *= self.w[drive.place.bar]
         else:
-            y["stroke"] = abs(line)
-            line /= y["stroke"]
-        for (sense, _), (bar, arm) in zip(drive.ends, arms, strict=True):
-            unit.push(bar, int(sense) * line, arm)
+            start, end = points
+            y["stroke"] = abs(end - start)
+            line = (end - start) / y["stroke"]
         a = self.x["a"]
         per_turn = {2: arb(1), 3: a / self.x["b"], 4: a / self.x["c"]}
-        turning = {bar: per_turn[bar] * self.sines[bar] for bar in MOVING_BARS}
-        foot = {2: acb(0), 3: acb(0, turning[2]) * self.tip[2], 4: acb(0)}
         reach = arb(0)
-        for bar, arm in arms:
+        for (sense, _), (bar, arm), point in zip(
+            drive.ends, self.ends, points, strict=True
+        ):
+            unit.push(bar, int(sense) * line, point)
             if bar != 1:
                 reach += per_turn[bar] * abs(arm) + (a if bar == 3 else 0)
-        y["drive_condition"] = abs(unit.power(foot, turning)) / reach
-        y["stroke_speed"] = unit.power(self.v_pin, self.omega)
+        turning = {bar: per_turn[bar] * self.sines[bar] for bar in MOVING_BARS}
+        y["drive_condition"] = abs(self.compute_power(unit, turning)) / reach
+        y["stroke_speed"] = self.compute_power(unit, self.omega)
         _put_vectors(y, {"drive_line": line})
         return unit
 
-    def solve_thirteen(self, unit: _Wrenches) -> tuple[dict[str, ComplexBall], Ball]:
+    def solve_forces(self, unit: _Wrenches) -> tuple[dict[str, ComplexBall], Ball]:
         """Solve for pin forces, complex, N, and the drive, N m or N, at one position.
 
-        Raises ZeroDivisionError where they are singular to working precision. Unknowns
-        are F12 F32 F23 F43 F14 F34 (x, y each) and the drive, of which one acts as
-        `unit`. Equations are Newton and Euler about each mass centre, then action and
-        reaction at A and B.
+        Raises ZeroDivisionError where they are singular to working precision. The
+        equations are Newton and Euler of the three bars about O2. One of the drive acts
+        as `unit`.
         """
         columns = []
-        needed = _Wrenches(self.centre)
+        O2, A, O4 = (self.first_pin[bar] for bar in MOVING_BARS)
+        places = {"F12": O2, "F32": A, "F43": O4 + self.tip[4], "F14": O4}
+        for name, place in places.items():
+            from_bar, on_bar = FORCE_BETWEEN[name]
+            for direction in (acb(1), acb(0, 1)):
+                one = _Wrenches()
+                one.push(on_bar, direction, place)
+                one.push(from_bar, -direction, place)
+                columns.append(one.components())
+        columns.append(unit.components())
         acting = self.sum_acting()
-        for bar in MOVING_BARS:
-            for arm in (acb(0), self.tip[bar]):
-                for direction in (acb(1), acb(0, 1)):
-                    alone = _Wrenches(self.centre)
-                    alone.push(bar, direction, arm)
-                    columns.append([*alone.components(), 0, 0, 0, 0])
-            acceleration = self.a_pin[bar] + self.swing(bar, self.centre[bar])
-            needed.force[bar] = self.x[f"m{bar}"] * acceleration - acting.force[bar]
-            moment = self.x[f"I{bar}"] * self.alpha[bar]
-            needed.moment[bar] = moment - acting.moment[bar]
-        for row, (action, reaction) in enumerate(REACTIONS, start=9):
-            columns[action][row] = columns[reaction][row] = 1
-        columns.append([*unit.components(), 0, 0, 0, 0])
-        right = arb_mat(13, 1, [*needed.components(), 0, 0, 0, 0])
-        solved = arb_mat(columns).transpose().solve(right)
-        forces = {}
-        for name, column in FORCE_COLUMNS.items():
-            forces[name] = acb(solved[column, 0], solved[column + 1, 0])
-        return forces, solved[12, 0]
+        for bar, centre in self.centre.items():
+            inertia = self.x[f"m{bar}"] * self.acceleration((bar, centre))
+            acting.push(bar, -inertia, centre)
+            acting.moment[bar] -= self.x[f"I{bar}"] * self.alpha[bar]
+        right = arb_mat(9, 1, [-component for component in acting.components()])
+        *forces, driving = arb_mat(columns).transpose().solve(right).entries()
+        vectors = map(acb, forces[::2], forces[1::2])
+        return dict(zip(places, vectors, strict=True)), driving
 
 
 _TERMS: dict[str, Callable[[_Loop, _Wrenches, Any], None]] = {
