@@ -23,10 +23,10 @@ from fourbar.scene.motion import Motion, Sweep
 from fourbar_lab import LAB_FOLDER
 from fourbar_validation.advise.advise import MOST_STEPS_OF_A_RUN, advise
 from fourbar_validation.advise.clocks import time_in_turns
-from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import judge_trial
 from fourbar_validation.engines.mujoco.trial import (
     FEWEST_STEPS,
+    JudgedSetup,
     TrialSetup,
     make_settings,
 )

@@ -26,9 +26,8 @@ from fourbar.solving import solve
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.tables import show_table
 from fourbar_validation.advise.clocks import time_call, time_in_turns
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.description import declares
-from fourbar_validation.engines.registry import ENGINES
+from fourbar_validation.engines.registry import ENGINES, ask_at
 
 LENGTHS_TEXT = 'ground = "30 cm"\ninput = "10 cm"\ncoupler = "25 cm"\noutput = "22 cm"'
 _OTHER_PINS = ("O2", "A", "O4")

@@ -36,7 +36,7 @@ from fourbar.quantities import (
     STAGE_OF,
 )
 from fourbar_lab.fault_scenes import FAULT_SCENES
-from fourbar_validation.engines.ball_arithmetic import find_refusal
+from fourbar_validation.engines.description import find_unknown
 from tests.support.balls import answer_in_balls
 from tests.support.rows import read_rows
 from tests.support.scenes import EPS, bare, draw_linkage
@@ -165,7 +165,7 @@ SCENES = dict(make_scenes()) | {
     if scene.motion.speed is not None
     and scene.motion.law is None
     and scene.motion.free is None
-    and not find_refusal(scene)
+    and not find_unknown(scene, lambda effect: effect.in_balls)
 }
 STROKE = FAULT_SCENES["stroke_input"]
 SCENES["a stroke from the bar"] = replace(

@@ -26,9 +26,8 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     sum_lengths,
 )
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.registry import make_prediction
+from fourbar_validation.engines.registry import ask_at, make_prediction
 from fourbar_validation.run.question import FREE_BODY, NotAskedError
 from tests.oracle.points import compare_points
 

@@ -1,6 +1,6 @@
 """Points of a study of the cost, of stated errors."""
 
-from fourbar_validation.advise.worst_errors import ERROR_NAMES, WorstErrors
+from fourbar_validation.advise.matters import ERROR_NAMES, WorstErrors
 from fourbar_validation.cost.work_precision import STEPPED_MOTION, CostPoint
 
 

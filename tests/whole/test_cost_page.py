@@ -12,12 +12,14 @@ from pytest import approx, mark
 from fourbar.files import load
 from fourbar.scene import command
 from fourbar.show.plot.style import apply_style
-from fourbar_validation.advise.matters import judge_trial
-from fourbar_validation.advise.worst_errors import compute_errors
+from fourbar_validation.advise.matters import compute_errors, judge_trial
 from fourbar_validation.cost import work_precision
-from fourbar_validation.cost.series import BEST, MUJOCO_TIMESTEP
-from fourbar_validation.engines.mujoco.defaults import restore_defaults
-from fourbar_validation.engines.mujoco.trial import TrialSetup, make_settings
+from fourbar_validation.cost.work_precision import BEST, MUJOCO_TIMESTEP
+from fourbar_validation.engines.mujoco.trial import (
+    TrialSetup,
+    make_settings,
+    restore_defaults,
+)
 from fourbar_validation.report.svg import write_alone
 from tests.support.checkout import ROOT, find_lines, read, read_table
 

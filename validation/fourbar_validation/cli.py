@@ -31,7 +31,7 @@ COMMANDS = {
         "filelock",
     ),
     "collect": LazyCommand(
-        "fourbar_validation.run.parts:collect_command",
+        "fourbar_validation.run.command:collect_command",
         "Put together the parts of a run.",
         "filelock",
     ),

@@ -45,9 +45,9 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
     reduce_angle,
 )
-from fourbar_validation.engines.linear import solve_refined
-from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.sliding import solve_refined
+from fourbar_validation.engines.tree import BarValues, Loaded
 
 EXUDYN_SIZE = 9
 """Coordinates, and constraints."""

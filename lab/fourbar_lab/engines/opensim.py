@@ -27,9 +27,9 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
     reduce_angle,
 )
-from fourbar_validation.engines.linear import solve_refined
-from fourbar_validation.engines.loaded import BarValues, Loaded
 from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.sliding import solve_refined
+from fourbar_validation.engines.tree import BarValues, Loaded
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 """Zero vector."""

@@ -28,7 +28,7 @@ from fourbar_lab.simulators.protocol_engines import (
 )
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop, open_model
-from fourbar_validation.engines.mujoco.defaults import remove_attributes
+from fourbar_validation.engines.mujoco.trial import remove_attributes
 
 _BY_DEFAULT = {
     "option": ("integrator", "solver", "tolerance", "iterations"),

@@ -28,7 +28,7 @@ from fourbar.quantities import PIN_FORCES
 from fourbar_lab import families, fault_scenes, stability
 from fourbar_lab.tally import TOO_LARGE
 from fourbar_validation.compare.tolerance import magnitude
-from fourbar_validation.engines.ball_arithmetic import BallArithmetic
+from fourbar_validation.engines.balls import BallArithmetic
 from tests.support.scenes import UNIFORM, WEIGHT
 
 TURNS = 2000.0 * np.pi

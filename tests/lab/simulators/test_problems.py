@@ -36,7 +36,7 @@ from fourbar_validation.check.problem import (
 from fourbar_validation.cli import status
 from fourbar_validation.compare.tolerance import EPS, K, magnitude
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.ball_arithmetic import BallArithmetic
+from fourbar_validation.engines.balls import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from tests.lab.simulators.test_simulators import ask_position
 from tests.support.checkout import ROOT, read

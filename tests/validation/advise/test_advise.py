@@ -16,12 +16,11 @@ from fourbar import InputError, Motion, dump, load
 from fourbar.scene import Command
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise import advise, matters
-from fourbar_validation.advise.judged_setup import JudgedSetup
-from fourbar_validation.advise.worst_errors import compute_errors
+from fourbar_validation.advise.matters import compute_errors
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.engines.guests import Guest, adjust_engines
 from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
-from fourbar_validation.engines.mujoco.trial import compute_expected_error
+from fourbar_validation.engines.mujoco.trial import JudgedSetup, compute_expected_error
 from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes.suites import MODELS

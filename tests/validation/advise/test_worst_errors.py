@@ -9,14 +9,13 @@ from pytest import approx, mark
 import fourbar
 from fourbar.mjcf import Settings
 from fourbar_validation.advise import advise
-from fourbar_validation.advise.judged_setup import JudgedSetup
-from fourbar_validation.advise.worst_errors import (
+from fourbar_validation.advise.matters import (
     ERROR_NAMES,
     INFINITE_ERRORS,
     compute_errors,
     find_greatest,
 )
-from fourbar_validation.engines.mujoco.trial import Trial
+from fourbar_validation.engines.mujoco.trial import JudgedSetup, Trial
 from tests.support.scenes import crank_rocker
 
 SCENE = crank_rocker(fourbar.Motion(fourbar.Sweep(0.1, 5.9, 39), 10.0))

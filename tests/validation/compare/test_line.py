@@ -12,7 +12,7 @@ from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import AGREES
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines.ball_arithmetic import BallArithmetic
+from fourbar_validation.engines.balls import BallArithmetic
 from fourbar_validation.engines.guests import GuestClient, Hello, Program
 from fourbar_validation.engines.registry import ENGINES, load_further
 from fourbar_validation.run.judge import judge

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from fourbar_validation.advise.worst_errors import WorstErrors
-from fourbar_validation.cost import charts, conclusion
+from fourbar_validation.advise.matters import WorstErrors
+from fourbar_validation.cost import charts, laws
 from tests.support.costs import point
 
 
@@ -13,7 +13,7 @@ def test_statement_and_conclusion_have_one_criterion():
     """
     curves = {
         "recommended": [point(30, 5e-5)],
-        "d": [replace(point(300, 4e-3), setting=conclusion.DEFAULT)],
+        "d": [replace(point(300, 4e-3), setting=laws.DEFAULT)],
         "RK4": [replace(point(10, 0.1), at_steps=WorstErrors(*[1e-9] * 5))],
     }
     assert (
@@ -21,7 +21,7 @@ def test_statement_and_conclusion_have_one_criterion():
         == "Four digits of torque cost 0.06 ms a simulated second;\n"
         "MuJoCo's defaults have an error of 4e-3"
     )
-    lines = conclusion.conclude(curves, [], [])
+    lines = laws.conclude(curves, [], [])
     assert len(lines) <= 11
     assert (
         "Four digits of every pin force: 0.06 ms (0.03 ms a revolution) by "

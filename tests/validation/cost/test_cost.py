@@ -23,18 +23,17 @@ from fourbar.show.plot.style import apply_style
 from fourbar_lab.contenders import CONTENDED_LINKAGE
 from fourbar_lab.fault_scenes import FAULT_SCENES
 from fourbar_validation.advise.clocks import summarise_timings
-from fourbar_validation.advise.judged_setup import JudgedSetup
-from fourbar_validation.advise.matters import judge_trial
-from fourbar_validation.advise.worst_errors import (
+from fourbar_validation.advise.matters import (
     ERROR_NAMES,
     INFINITE_ERRORS,
     WorstErrors,
     compute_errors,
+    judge_trial,
 )
-from fourbar_validation.cost import charts, conclusion, laws, work_precision
+from fourbar_validation.cost import charts, laws, work_precision
 from fourbar_validation.cost.cost import cost, list_front
-from fourbar_validation.cost.series import BEST, Spot
-from fourbar_validation.engines.mujoco.trial import TrialSetup
+from fourbar_validation.cost.work_precision import BEST, Spot
+from fourbar_validation.engines.mujoco.trial import JudgedSetup, TrialSetup
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.checkout import find_lines, read
 from tests.support.costs import point
@@ -304,7 +303,7 @@ def test_names_in_a_picture_cover_no_other_and_are_not_cut():
             for name in (work_precision.PINOCCHIO, work_precision.MUJOCO_INVERSE)
         ],
         "Euler": [
-            replace(point(20, 0.2), setting=conclusion.DEFAULT, seconds_per_second=0.3)
+            replace(point(20, 0.2), setting=laws.DEFAULT, seconds_per_second=0.3)
         ],
         "recommended": [point(20 * 2**k, 1e-3 / 8**k) for k in range(4)],
     }

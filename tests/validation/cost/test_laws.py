@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from pytest import approx, mark
 
-from fourbar_validation.advise.worst_errors import ERROR_NAMES
-from fourbar_validation.cost.conclusion import find_cheapest
+from fourbar_validation.advise.matters import ERROR_NAMES
 from fourbar_validation.cost.laws import (
     ErrorLaw,
+    find_cheapest,
     find_floor,
     find_pareto,
     fit_laws,

@@ -5,7 +5,7 @@ import numpy as np
 import fourbar
 from fourbar.scene import Command, Scene
 from fourbar_validation.compare.answer import Answer
-from fourbar_validation.engines.asking import ask_at
+from fourbar_validation.engines.registry import ask_at
 from tests.support.rows import each_branch
 
 

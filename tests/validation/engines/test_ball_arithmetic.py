@@ -8,7 +8,7 @@ import pytest
 
 import fourbar
 from fourbar import Motion, Scene, uniform
-from fourbar_validation.engines.ball_arithmetic import compute_exact_sines
+from fourbar_validation.engines.balls import compute_exact_sines
 from fourbar_validation.engines.description import find_stated_lengths
 from fourbar_validation.run.identities import check_status
 from fourbar_validation.run.judge import make_question

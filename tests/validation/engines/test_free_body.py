@@ -12,10 +12,9 @@ from fourbar.effects import Friction, Gravity, Load, Place, Spring, Springs, Tor
 from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
 from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
-from fourbar_validation.engines.linear import solve_system
-from fourbar_validation.engines.sliding import continue_couples
+from fourbar_validation.engines.registry import ask_at
+from fourbar_validation.engines.sliding import continue_couples, solve_system
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
 from tests.support.scenes import EPS, bare, crank_rocker

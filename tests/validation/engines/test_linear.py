@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from fourbar_validation.compare.tolerance import EPS, K
-from fourbar_validation.engines.linear import solve_refined
+from fourbar_validation.engines.sliding import solve_refined
 
 
 @pytest.mark.parametrize("steady", [0.0, 2.5])

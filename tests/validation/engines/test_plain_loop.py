@@ -7,10 +7,10 @@ import pytest
 
 from fourbar import PinFriction, Viscous, command, load
 from fourbar.errors import LimitError
-from fourbar_validation.advise.worst_errors import compute_errors
+from fourbar_validation.advise.matters import compute_errors
+from fourbar_validation.engines.loop import PlainLoop
 from fourbar_validation.engines.mujoco.inverse import MujocoTree
 from fourbar_validation.engines.pinocchio import PinocchioTree
-from fourbar_validation.engines.plain_loop import PlainLoop
 from fourbar_validation.places import MODELS
 from tests.support.scenes import crank_rocker, low_parallelogram, thesis
 

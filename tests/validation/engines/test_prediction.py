@@ -27,7 +27,7 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.ball_arithmetic import BallArithmetic
+from fourbar_validation.engines.balls import BallArithmetic
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.prediction import _bound_touching, predict_from_data
 from fourbar_validation.engines.registry import Engine, list_engines, make_prediction

@@ -20,8 +20,8 @@ from fourbar.scene import command as list_positions
 from fourbar_validation.compare.answer import Answer, EngineError
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
+from fourbar_validation.engines.registry import ask_at
 from fourbar_validation.places import MODELS
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import DrawnType

@@ -23,7 +23,6 @@ from fourbar_validation.compare.tolerance import (
     K,
     magnitude,
 )
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.limits import BOUNDARIES, QUICKEST_START
 from fourbar_validation.engines.mujoco import shipped, simulate
 from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
@@ -32,7 +31,7 @@ from fourbar_validation.engines.prediction import (
     predict_from_data,
     predict_in_world_axes,
 )
-from fourbar_validation.engines.registry import HARD_ENGINES, make_answer_nearby
+from fourbar_validation.engines.registry import HARD_ENGINES, ask_at, make_answer_nearby
 from fourbar_validation.run.judge import judge
 from fourbar_validation.scenes import hard_families as families
 from fourbar_validation.scenes.hard_families import (

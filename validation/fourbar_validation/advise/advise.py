@@ -21,15 +21,14 @@ from fourbar.mjcf import Settings, write_mjcf
 from fourbar.scene import Scene
 from fourbar.writing import require_file, write_text
 from fourbar_validation.advise.clocks import time_kinds
-from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import (
     DEGREE_BETWEEN,
     MATTERS,
+    WorstErrors,
     judge_trial,
     measure_influences,
     write_sentence,
 )
-from fourbar_validation.advise.worst_errors import WorstErrors
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     MeasureOptions,
 )
@@ -38,6 +37,7 @@ from fourbar_validation.engines.mujoco.trial import (
     LONGEST_TIME_CONSTANT,
     ORDER_OF_RK4,
     SHORTEST_TIME_CONSTANT,
+    JudgedSetup,
     Trial,
     TrialSetup,
     describe_settings,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from fourbar.show.plot.labels import add_label, settle_labels
 from fourbar.show.plot.style import apply_style
 from fourbar.writing import write_text
-from fourbar_validation.cost.conclusion import (
+from fourbar_validation.cost.laws import (
     ERROR_IN_WORDS,
     ERROR_OF_FOUR_DIGITS,
     QUANTITY_WORDS,
@@ -20,12 +20,12 @@ from fourbar_validation.cost.conclusion import (
     Curves,
     find_cheapest,
     find_default,
+    find_pareto,
     list_stepped,
     write_one_digit,
 )
-from fourbar_validation.cost.laws import find_pareto
-from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.work_precision import (
+    BEST,
     EXACT_MOTION,
     FORMULAS_CURVE,
     MUJOCO_INVERSE,

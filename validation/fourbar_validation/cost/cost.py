@@ -9,26 +9,24 @@ import click
 from fourbar.errors import FAILED, HOLDS
 from fourbar.scene import Scene
 from fourbar.writing import write_text
-from fourbar_validation.advise.judged_setup import JudgedSetup
 from fourbar_validation.advise.matters import measure_influences
 from fourbar_validation.compare.rows import write_csv_rows
-from fourbar_validation.cost.conclusion import (
-    Curves,
-    conclude,
-    list_stepped,
-)
 from fourbar_validation.cost.laws import (
+    Curves,
     ErrorLaw,
+    conclude,
     find_pareto,
     fit_laws,
+    list_stepped,
     write_laws,
 )
-from fourbar_validation.cost.series import BEST
 from fourbar_validation.cost.work_precision import (
+    BEST,
     COST_COLUMNS,
     CostStudy,
     list_cells,
 )
+from fourbar_validation.engines.mujoco.trial import JudgedSetup
 from fourbar_validation.places import MODELS
 from fourbar_validation.report.machine import describe_setup
 from fourbar_validation.report.sentences import make_words_table, print_sentence

@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.linkage import PINS
 from fourbar.scene import Scene
 from fourbar_validation.engines.description import declares, find_field, look_up
-from fourbar_validation.engines.loaded import Act, Loaded
+from fourbar_validation.engines.tree import Act, Loaded
 
 if TYPE_CHECKING:
     from fourbar.effects import (

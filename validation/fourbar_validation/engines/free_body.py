@@ -41,8 +41,11 @@ from fourbar_validation.engines.free_body_effects import (
     list_sliding_pins,
     sum_acting,
 )
-from fourbar_validation.engines.linear import solve_system
-from fourbar_validation.engines.sliding import continue_couples, solve_couples
+from fourbar_validation.engines.sliding import (
+    continue_couples,
+    solve_couples,
+    solve_system,
+)
 
 NAME = "free-body"
 FORCE_COLUMNS = {"F12": 0, "F32": 2, "F23": 4, "F43": 6, "F34": 8, "F14": 10}

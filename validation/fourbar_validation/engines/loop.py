@@ -16,6 +16,7 @@ from fourbar.errors import LimitError
 from fourbar.quantities import (
     ANGLES,
     LINE_QUANTITIES,
+    PIN_FORCES,
     STAGE_OF,
     STAGES,
     VECTORS,
@@ -23,7 +24,7 @@ from fourbar.quantities import (
     Mask,
     Signs,
 )
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
@@ -38,7 +39,15 @@ from fourbar_validation.engines.free_body_closure import (
     NEWTON_STEPS,
     find_angle,
 )
-from fourbar_validation.engines.loaded import Assembled, BarValues, Components, Loaded
+from fourbar_validation.engines.tree import (
+    Assembled,
+    BarValues,
+    Components,
+    Loaded,
+    Tree,
+    solve_closed,
+    solve_multipliers,
+)
 
 NOT_ANSWERED = frozenset(
     (
@@ -322,3 +331,44 @@ def split_answer(
     theta_2, omega_2, alpha_2 = (out[name] for name in MADE)
     rest = {name: values for name, values in out.items() if name not in MADE}
     return Command(theta_2, branch, omega_2, alpha_2), rest
+
+
+class PlainLoop:
+    """A scene in the tree of one engine, asked for torque and pin forces alone.
+
+    A position takes Newton's steps on the gap, the rates of the closed loop, one
+    inverse dynamics and the multipliers, as a user would write them.
+
+    Raises LimitError for a cylinder, and for friction that depends on the pin forces.
+    """
+
+    def __init__(self, build: Callable[[Scene], Tree], scene: Scene) -> None:
+        if scene.drive is not None:
+            raise LimitError("the plain loop has a couple on a bar, no cylinder")
+        self.linkage = scene.linkage
+        self.tree = tree = build(state_from_pins(scene))
+        if tree.loaded:
+            raise LimitError("the plain loop does not iterate over loads of pins")
+        self.position = Assembler(tree)
+        self.drive = tree.turns[scene.drive_bar]
+
+    def answer(self, command: Command) -> dict[str, Array]:
+        """Return the torque, (n,), and the pin forces, (n, 2)."""
+        tree = self.tree
+
+        def read(
+            theta: float, branch: int, speed: float, acceleration: float
+        ) -> dict[str, Any]:
+            if self.position.find(theta, branch) is None:
+                raise LimitError("the loop does not close at every position")
+            jacobian = tree.jacobian()
+            v = solve_closed(jacobian, speed)
+            a = solve_closed(jacobian, acceleration, drift=tree.drift(v))
+            tree.moving(v, a)
+            x, y, torque = solve_multipliers(jacobian, self.drive, tree.torques())
+            forces = tree.forces(complex(x, y), torque)
+            return {"torque": torque, "F43": (x, y), **forces}
+
+        signed = with_signs(self.linkage, command)
+        answered, _ = read_each(signed, ("torque", *PIN_FORCES), read)
+        return answered

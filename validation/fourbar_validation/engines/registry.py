@@ -17,7 +17,7 @@ import numpy as np
 from fourbar.errors import say_install
 from fourbar.linkage import record
 from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS, Array
-from fourbar.scene import Command, LimitOrigin, Scene
+from fourbar.scene import Command, LimitOrigin, Scene, StrokeOrigin, with_signs
 from fourbar.solution import Solution
 from fourbar_validation.compare.answer import Adapter, Answer
 from fourbar_validation.compare.compare import (
@@ -34,8 +34,6 @@ from fourbar_validation.compare.tolerance import (
     ErrorBound,
     Mask,
 )
-from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.ball_arithmetic import BallArithmetic, shift_to
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.loop import make_blank
 from fourbar_validation.engines.prediction import (
@@ -45,6 +43,7 @@ from fourbar_validation.engines.prediction import (
     predict_from_data,
     predict_in_world_axes,
 )
+from fourbar_validation.engines.protocol import require_near
 
 Predictor = Callable[[Scene, Command, str, Mask], Array]
 """Predicts the absolute error of a quantity at the positions of a mask, (n,)."""
@@ -242,7 +241,7 @@ ENGINES = (
 
 BALLS = Engine(
     "ball-arithmetic",
-    BallArithmetic,
+    Later(f"{ENGINES_PACKAGE}.balls:BallArithmetic"),
     FULL_ACCURACY,
     answers_nearby=True,
     library="flint",
@@ -393,6 +392,8 @@ def make_answer_nearby(
 
     @cache
     def answer() -> dict[str, Array]:
+        from fourbar_validation.engines.balls import shift_to
+
         adapter = engine.start()
         out = make_blank(len(formulas), COMPARED_QUANTITIES)
         told = formulas.assembled & np.isfinite(formulas.sin_mu)
@@ -410,3 +411,40 @@ def make_answer_nearby(
         return out
 
     return answer
+
+
+def ask_at(
+    adapter: Adapter,
+    scene: Scene,
+    command: Command,
+) -> Answer:
+    """Give an engine what is commanded, with the sign of its sine.
+
+    The sign is at each position; nothing else of the formulas is given.
+    """
+    bare = remove_angles(with_signs(scene.linkage, command))
+    answer = adapter.answer(scene, bare)
+    if answer.at is bare:
+        return replace(answer, at=command)
+    if answer.at is None:
+        return answer
+    if command.moves_stroke:
+        require_near(answer.at, command)
+    return replace(answer, at=with_signs(scene.linkage, answer.at))
+
+
+def remove_angles(command: Command) -> Command:
+    """Put NaN for the bar's motion in a command by a stroke.
+
+    The formulas computed it from the stroke.
+    """
+    if not isinstance(command.origin, StrokeOrigin):
+        return command
+    unknown = np.full_like(command.angle, np.nan)
+    speed = None if command.speed is None else unknown
+    return command._replace(
+        angle=unknown,
+        speed=speed,
+        acceleration=unknown,
+        origin=StrokeOrigin(*command.stated),
+    )

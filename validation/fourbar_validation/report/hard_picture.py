@@ -7,8 +7,7 @@ from fourbar.scene import Scene
 from fourbar.scene import command as command_of
 from fourbar.solving import solve
 from fourbar_validation.compare.tolerance import find_error, magnitude
-from fourbar_validation.engines.asking import ask_at
-from fourbar_validation.engines.registry import Engine
+from fourbar_validation.engines.registry import Engine, ask_at
 from fourbar_validation.scenes.hard_families import Hard
 
 APPROACHES = (

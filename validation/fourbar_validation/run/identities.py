@@ -51,7 +51,6 @@ from fourbar_validation.compare.tolerance import (
     magnitude,
     mark_touching,
 )
-from fourbar_validation.engines.ball_arithmetic import compute_exact_sines
 from fourbar_validation.engines.description import name_driving
 from fourbar_validation.engines.free_body import count_solutions
 from fourbar_validation.engines.registry import find_missing
@@ -286,6 +285,8 @@ def _compare_status(question: Question, reference: Solution) -> Row:
     of_theta_2 = command.remainder is None and command.commanded == "theta_2"
     if of_theta_2 and len(near) and not find_missing("flint"):
         # exact arithmetic has to decide there
+        from fourbar_validation.engines.balls import compute_exact_sines
+
         sine = np.abs(compute_exact_sines(linkage, select_positions(command, near)))
         closes = np.isfinite(sine)
         wrong = np.where(

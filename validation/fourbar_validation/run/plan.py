@@ -40,6 +40,8 @@ _MOST_TASKS = 10_000
 """Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
 _MOST_KEPT_NAMED = 5
 """Scenes whose kept answers a resumed run names; further ones are counted."""
+REQUEST_FILE = "request.json"
+"""File beside a part that says what was asked for, so that parts can be collected."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
 

@@ -25,11 +25,10 @@ from fourbar_validation.compare.rows import (
 )
 from fourbar_validation.compare.scales import Scale, make_reference
 from fourbar_validation.compare.tolerance import Mask
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import list_needs
 from fourbar_validation.engines.programs import keep_printed
-from fourbar_validation.engines.registry import ENGINES, Engine
+from fourbar_validation.engines.registry import ENGINES, Engine, ask_at
 from fourbar_validation.report.scene_record import Record, Timing
 
 FREE_BODY = next(engine for engine in ENGINES if engine.name == FreeBody.name)

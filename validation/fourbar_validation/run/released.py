@@ -37,13 +37,13 @@ from fourbar_validation.compare.tolerance import (
     divide,
     replace_zero_size,
 )
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.guests import Guest
 from fourbar_validation.engines.registry import (
     ENGINES_PACKAGE,
     Engine,
     Later,
+    ask_at,
     find_missing,
     make_demands,
 )

@@ -50,6 +50,7 @@ from fourbar_validation.run.judge import OUTPUT
 from fourbar_validation.run.plan import (
     COLLECTING,
     DRAWING,
+    REQUEST_FILE,
     UNHEARD,
     Job,
     Plan,
@@ -57,7 +58,6 @@ from fourbar_validation.run.plan import (
     judge_tasks,
     make_jobs,
 )
-from fourbar_validation.run.request import forget_request
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
 
@@ -93,7 +93,7 @@ def run(plan: Plan, out: Path, progress: Progress = UNHEARD) -> Summary:
         plan.judge(store, progress)
         summary = write_outcome(plan, store.read, out, progress)
         store.finish()
-        forget_request(out)
+        (out / REQUEST_FILE).unlink(missing_ok=True)
     return summary
 
 

@@ -15,7 +15,6 @@ from fourbar.quantities import PIN_FORCES, UNKNOWNS
 from fourbar_validation.compare.compare import Comparison, Demands
 from fourbar_validation.compare.rows import AGREES, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import SIMULATED
-from fourbar_validation.engines.asking import ask_at
 from fourbar_validation.engines.limits import (
     MOST_UNEVEN,
     NEAREST_CENTRE,
@@ -25,6 +24,7 @@ from fourbar_validation.engines.mujoco.closed_loop import ClosedLoop
 from fourbar_validation.engines.mujoco.monitor import ResidualMonitor
 from fourbar_validation.engines.mujoco.runner import Lead
 from fourbar_validation.engines.mujoco.simulate import MujocoSimulated
+from fourbar_validation.engines.registry import ask_at
 from fourbar_validation.places import MODELS
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.judge_engines import compare_answer

@@ -6,10 +6,9 @@ import pytest
 
 import fourbar
 from fourbar.mjcf import Settings, size_flywheel
-from fourbar_validation.advise.worst_errors import ERROR_NAMES, compute_errors
-from fourbar_validation.cost.series import BEST, WITHOUT_PADS
-from fourbar_validation.engines.mujoco.defaults import restore_defaults
-from fourbar_validation.engines.mujoco.trial import Edit, TrialSetup
+from fourbar_validation.advise.matters import ERROR_NAMES, compute_errors
+from fourbar_validation.cost.work_precision import BEST, WITHOUT_PADS
+from fourbar_validation.engines.mujoco.trial import Edit, TrialSetup, restore_defaults
 from fourbar_validation.scenes.suites import MODELS
 from tests.support.second_loop import LoopSettings, measure
 

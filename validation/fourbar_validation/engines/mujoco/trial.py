@@ -15,9 +15,10 @@ how wrong it is against them stays a finding.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -26,6 +27,7 @@ from fourbar.errors import LimitError, write_count
 from fourbar.mjcf import Settings, write_mjcf
 from fourbar.quantities import PIN_FORCES, Array
 from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import command as command_of
 from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
@@ -382,3 +384,91 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
     if np.isfinite(worst):
         return worst
     return float("inf")
+
+
+INTERVALS_READ = 180
+"""Intervals of the sweep at which a run is read at least."""
+DENSEST_INTERVALS = 16 * INTERVALS_READ
+"""Intervals beyond which steps are so dense that a curve of degree 7 through them is
+exact to round-off.
+"""
+
+
+class JudgedSetup(TrialSetup):
+    """A scene, ready to be tried with any settings, each read at all of its steps.
+
+    Parameters
+    ----------
+    before : theta_2 of a further position before the sweep, from which a run starts,
+        rad.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        intervals: int = INTERVALS_READ,
+        before: float | None = None,
+    ) -> None:
+        command = add_positions(command_of(scene), intervals)
+        if before is not None:
+            command = command._replace(
+                angle=np.append(command.theta_2, before),
+                branch=np.append(command.branch, command.branch[0]),
+            )
+        super().__init__(scene, command)
+        self.stated = scene
+        self.intervals = intervals
+        self.before = before
+        self._denser: JudgedSetup | None = None
+
+    def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
+        """Run through the scene with as many positions as there are steps."""
+        if self.intervals > self.steps(settings) or self.intervals >= DENSEST_INTERVALS:
+            return super().try_out(settings, edit)
+        if self._denser is None:
+            self._denser = JudgedSetup(self.stated, 4 * self.intervals, self.before)
+        return self._denser.try_out(settings, edit)
+
+
+def add_positions(command: Command, intervals: int) -> Command:
+    """Return a command with evenly spaced positions between its own.
+
+    Errors have their peaks there, most near a pole of T3, T4. A command whose branch
+    changes is left as it is.
+    """
+    if np.ptp(command.branch) != 0:
+        return command
+    ends = command.theta_2.min(), command.theta_2.max()
+    theta_2 = np.union1d(command.theta_2, np.linspace(*ends, intervals + 1))
+    return command._replace(
+        angle=theta_2,
+        branch=np.full(theta_2.shape, command.branch[0], dtype=np.int8),
+    )
+
+
+def remove_attributes(mjcf: str, attributes: Mapping[str, Sequence[str]]) -> str:
+    """Remove these attributes of the elements at these paths from a text.
+
+    What they state is left to MuJoCo.
+    """
+    root = ET.fromstring(mjcf)
+    for path, names in attributes.items():
+        element = root.find(path)
+        assert element is not None
+        for name in names:
+            element.attrib.pop(name, None)
+    return ET.tostring(root, encoding="unicode")
+
+
+def restore_defaults(mjcf: str) -> str:
+    """Return a text in which solref, solimp and the solver are left to MuJoCo.
+
+    MuJoCo's defaults are 0.02 s, impedance 0.9 to 0.95, and Newton to 1e-8.
+    """
+    return remove_attributes(
+        mjcf,
+        {
+            "option": ("solver", "tolerance", "iterations"),
+            "equality/connect": ("solref", "solimp"),
+        },
+    )
