@@ -16,11 +16,11 @@ import fourbar
 from fourbar import Motion, Place, Sweep
 from fourbar_validation.compare.answer import explain_refusal
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
-from fourbar_validation.engines import asking, guests, programs, registry
+from fourbar_validation.engines import guests, programs, registry
+from fourbar_validation.run.command import Request, select_engines
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.question import FREE_BODY
-from fourbar_validation.run.command import Request, select_engines
 from fourbar_validation.run.run import run
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.guests import (
@@ -560,7 +560,9 @@ def test_our_own_adapters_answer_the_same_bytes_through_the_host(engine):
         command = fourbar.command(scene)
         if explain_refusal(inside, command):
             continue
-        ours, theirs = (asking.ask_at(one, scene, command) for one in (inside, outside))
+        ours, theirs = (
+            registry.ask_at(one, scene, command) for one in (inside, outside)
+        )
         for name in SAME:
             np.testing.assert_equal(getattr(theirs, name), getattr(ours, name), name)
         answered += 1
