@@ -130,7 +130,7 @@ def _proximal(mu):
         released = pinocchio.PinocchioReleased().release(scene, np.array([0.0, 0.01]))
     finally:
         pinocchio.PROXIMAL_SETTINGS = kept
-    return np.isfinite(released.theta_2).all()
+    return np.isfinite(released.quantities["theta_2"]).all()
 
 
 MEASURED = (

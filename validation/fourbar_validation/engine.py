@@ -163,9 +163,8 @@ def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
             question["times"],
         )
         step = {"step": float(question["step"])} if "step" in question else {}
-        return protocol.released_to_json(
-            make(**step).release(scene, np.array(question["times"]))
-        )
+        released = make(**step).release(scene, np.array(question["times"]))
+        return protocol.answer_to_json(scene, None, released)
     scene, command = protocol.command_from_json(scene, question["command"])
     try:
         engine = make(**protocol.read_setting(question.get("setting")))

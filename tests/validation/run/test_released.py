@@ -13,7 +13,7 @@ from pytest import mark
 from fourbar import Bar, FourBar, Free, Friction, Gravity, Load, Motion, Table
 from fourbar.scene import Scene
 from fourbar.solving import solve
-from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
 from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES, UNDECIDED
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines.pinocchio import PinocchioReleased
@@ -55,7 +55,7 @@ def find_spread_by_energy(scene, solution, instant, engine):
     """
     start, _ = free.FORWARD[engine]
     times = np.linspace(0.0, 1.0, len(solution))
-    energy = start(free.LONGEST_TIMESTEP).release(scene, times).energy
+    energy = start(free.LONGEST_TIMESTEP).release(scene, times).quantities["energy"]
     lost = float(abs(energy - energy[0]).max())
     kinetic = 0.0
     for number in (2, 3, 4):
@@ -156,6 +156,13 @@ def test_a_load_over_theta_2_is_a_declared_limit_of_mujoco():
 TRUE = PinocchioReleased.release
 
 
+def shift(released, angle):
+    """Move theta_2 of a released motion, rad."""
+    quantities = released.quantities
+    moved = quantities | {"theta_2": quantities["theta_2"] + angle}
+    return replace(released, quantities=moved)
+
+
 def answering(monkeypatch, change):
     """The rows of Pinocchio where its answer is changed."""
     monkeypatch.setattr(
@@ -168,16 +175,17 @@ def answering(monkeypatch, change):
 @mark.slow
 def test_an_engine_that_stops_is_nan_or_drifts_unpredicted_fails(monkeypatch):
     def cut(answer):
-        names = ("theta_2", "omega_2", "energy")
-        return replace(answer, **{name: getattr(answer, name)[:20] for name in names})
+        for name in ("theta_2", "omega_2", "energy"):
+            answer.quantities[name] = answer.quantities[name][:20]
+        return answer
 
     def strike(index, answer):
-        answer.theta_2[index] = np.nan
+        answer.quantities["theta_2"][index] = np.nan
         return answer
 
     def drift(answer):
         """Be wrong by the same amount with either step: it predicts nothing of it."""
-        return replace(answer, theta_2=answer.theta_2 + 1e-3)
+        return shift(answer, 1e-3)
 
     (only,) = answering(monkeypatch, cut)
     assert only.verdict == FAILS and "20 of 101 instants" in only.reason
@@ -213,7 +221,7 @@ def test_an_engine_that_predicts_nothing_of_itself_is_undecided(
     shifts = iter(off)
     rows = answering(
         monkeypatch,
-        lambda released: replace(released, theta_2=released.theta_2 + next(shifts)),
+        lambda released: shift(released, next(shifts)),
     )
     assert row(rows, "pinocchio-forward", "theta_2").verdict == verdict
 
@@ -223,7 +231,9 @@ def test_a_guest_may_err_in_a_released_motion_by_what_it_declares(declared, verd
     """One of adaptive steps errs alike whatever step it is given."""
     question = ask_briefly()
     moved = question.solution.theta_2 + 3e-5, question.solution.omega_2
-    answer = ReleasedAnswer("adaptive", "", *moved, np.zeros(6), np.ones(6))
+    numbers = (*moved, np.zeros(6), np.ones(6))
+    quantities = dict(zip(RELEASED_QUANTITIES, numbers, strict=True))
+    answer = Answer("adaptive", "", quantities=quantities)
     tolerance = replace(EQUIVALENCE, factor=declared, reason="as it says")
     rows = free._make_rows(question, answer, answer, tolerance)
     assert row(rows, "adaptive", "theta_2").verdict == verdict

@@ -6,12 +6,15 @@ A refusal in their place has a reason.
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-
 from fourbar.errors import FourBarError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array, Mask
 from fourbar.scene import Command, Scene
+
+RELEASED_QUANTITIES = ("theta_2", "omega_2", "energy", "terms")
+"""Quantities of a released motion at stated times, (n,). The energy is kinetic and
+potential energy less the work that was done, J; `terms` are their magnitudes, summed.
+"""
 
 
 @dataclass(slots=True, eq=False)
@@ -31,7 +34,7 @@ class Answer:
     """Positions where the engine found by its own means that the loop closes, (n,)."""
     quantities: dict[str, Array] = field(default_factory=dict)
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not
-    answered.
+    answered. A released motion has those of `RELEASED_QUANTITIES`.
     """
     refusal: str | None = None
     """Declared limit of the engine that this scene meets, with its reason. Nothing else
@@ -96,26 +99,3 @@ def explain_refusal(engine: Adapter, command: Command) -> str:
         f"it takes a command of {', '.join(takes)}, and here {command.commanded} is"
         " commanded"
     )
-
-
-@dataclass(slots=True, eq=False)
-class ReleasedAnswer:
-    """A free motion as one engine integrated it, at stated times."""
-
-    engine: str
-    setting: str
-    theta_2: Array
-    """(n,), rad, continuous."""
-    omega_2: Array
-    energy: Array
-    """Kinetic and potential energy less the work that was done, (n,), J."""
-    terms: Array
-    """Their magnitudes, summed, (n,), J."""
-    refusal: str | None = None
-    """A declared limit that the scene meets; then the arrays are empty."""
-
-    @classmethod
-    def refused(cls, engine: str, setting: str, reason: str) -> "ReleasedAnswer":
-        """Return an answer without a motion, and with the reason."""
-        none = np.empty(0)
-        return cls(engine, setting, none, none, none, none, refusal=reason)

@@ -22,7 +22,7 @@ from fourbar.errors import InputError
 from fourbar.linkage import record
 from fourbar.quantities import ANGLES, DRY_FRICTION_QUANTITIES, Array
 from fourbar.scene import Command, Scene
-from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
+from fourbar_validation.compare.answer import Answer, EngineError
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES
 from fourbar_validation.compare.rows import FORMULAS, write_one_line
 from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_simulated
@@ -402,10 +402,10 @@ class GuestClient:
             partial(protocol.answer_from_json, self.name, command),
         )
 
-    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
+    def release(self, scene: Scene, times: Array) -> Answer:
         """Return the released motion as the guest integrates it."""
         if refusal := self._explain_refusal(scene):
-            return ReleasedAnswer.refused(self.name, "-", refusal)
+            return Answer(self.name, "-", refusal=refusal)
         data = protocol.release_to_json(scene)
         if self.step is not None:
             data["step"] = self.step

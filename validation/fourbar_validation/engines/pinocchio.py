@@ -16,7 +16,7 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
-from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
 from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
@@ -236,10 +236,13 @@ class PinocchioReleased:
     def __init__(self, step: float = 2e-3) -> None:
         self.step = step
 
-    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
+    def release(self, scene: Scene, times: Array) -> Answer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         setting = f"RK4 {self.step:g} s"
-        refuse = partial(ReleasedAnswer.refused, RELEASED_NAME, setting)
+
+        def refuse(reason: str) -> Answer:
+            return Answer(RELEASED_NAME, setting, refusal=reason)
+
         if scene.loads or any(
             not isinstance(effect, Gravity) for effect in scene.effects
         ):
@@ -272,4 +275,5 @@ class PinocchioReleased:
             energy = pin.computeMechanicalEnergy(tree.model, data, q, v)
             terms = data.kinetic_energy + abs(data.potential_energy)
             rows.append((q[0], v[0], energy, terms))
-        return ReleasedAnswer(RELEASED_NAME, setting, *np.array(rows).T)
+        columns = zip(RELEASED_QUANTITIES, np.array(rows).T, strict=True)
+        return Answer(RELEASED_NAME, setting, quantities=dict(columns))

@@ -40,7 +40,7 @@ from fourbar.scene.motion import (
     Free,
     Motion,
 )
-from fourbar_validation.compare.answer import Answer, EngineError, ReleasedAnswer
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer, EngineError
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.compare.tolerance import OF_THE_COMMAND
@@ -59,7 +59,6 @@ EFFECT_WORDS = (*WITH_COUPLES, "cylinder", "push", ONE_SIDED, "release")
 """Words that a hello may list in `effects`."""
 DESCRIBED_TABLES = ("lengths", "bars", "drive", "loads", "effects")
 KINDS_OF_COMMAND = (*COMMAND_NAMES.values(), STROKE_COMMAND)
-_OF_RELEASED = ("theta_2", "omega_2", "energy", "terms")
 
 
 class _NumberEntry(Entry):
@@ -328,10 +327,13 @@ def _make_array(values: list[Any], gaps: bool) -> Array | None:
 
 def answer_to_json(
     scene: Scene,
-    command: Command,
+    command: Command | None,
     answer: Answer,
 ) -> dict[str, Any]:
-    """Write an answer, without the engine's name, which its hello states."""
+    """Write an answer, without the engine's name, which its hello states.
+
+    Without a command the answer is a released motion.
+    """
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
     data: dict[str, Any] = {"answers": _write_arrays(answer.quantities)}
@@ -620,26 +622,14 @@ def release_from_json(
     )
 
 
-def released_to_json(released: ReleasedAnswer) -> dict[str, Any]:
-    """Write a released motion as an engine integrated it."""
-    if released.refusal is not None:
-        return {"refusal": released.refusal, "setting": released.setting}
-    answers = {name: getattr(released, name) for name in _OF_RELEASED}
-    return {"answers": _write_arrays(answers), "setting": released.setting}
-
-
-def released_from_json(
-    engine: str,
-    n: int,
-    data: Any,
-) -> ReleasedAnswer:
+def released_from_json(engine: str, n: int, data: Any) -> Answer:
     """Read and check a released motion at n times, as `answer_from_json` does."""
     data, setting, refusal = _read_reply(data)
     if refusal:
-        return ReleasedAnswer.refused(engine, setting, refusal)
+        return Answer(engine, setting, refusal=refusal)
     answers = _read_object("answers", data)
-    theta, omega, energy, terms = (
-        _read_numbers(f"answers.{name}", answers.get(name), n, gaps=True)
-        for name in _OF_RELEASED
-    )
-    return ReleasedAnswer(engine, setting, theta, omega, energy, terms)
+    quantities = {
+        name: _read_numbers(f"answers.{name}", answers.get(name), n, gaps=True)
+        for name in RELEASED_QUANTITIES
+    }
+    return Answer(engine, setting, quantities=quantities)

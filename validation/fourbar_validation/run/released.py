@@ -18,7 +18,7 @@ from fourbar.effects import Friction, Load
 from fourbar.linkage import PINS
 from fourbar.quantities import UNKNOWNS, Indices
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.compare.answer import Answer
 from fourbar_validation.compare.compare import Comparison
 from fourbar_validation.compare.rows import (
     DEGRADED,
@@ -250,8 +250,8 @@ def _hold_by_friction(
 
 def _make_rows(
     question: Question,
-    fine: ReleasedAnswer,
-    coarse: ReleasedAnswer,
+    fine: Answer,
+    coarse: Answer,
     tolerance: ErrorBound,
 ) -> list[Row]:
     """Judge the motion by that of the formulas, and by that of twice the step.
@@ -263,21 +263,21 @@ def _make_rows(
     assert free is not None and omega_2 is not None
     n = len(omega_2)
     who = (question.name, fine.engine, fine.setting)
-    if len(fine.theta_2) < n:
-        why = f"it stopped after {len(fine.theta_2)} of {n} instants"
+    made = len(fine.quantities["theta_2"])
+    if made < n:
+        why = f"it stopped after {made} of {n} instants"
         return [Row.unmeasured(*who, "all", FAILS, why)]
     compared = {
-        "theta_2": (fine.theta_2, coarse.theta_2, question.solution.theta_2, 1.0),
-        "omega_2": (fine.omega_2, coarse.omega_2, omega_2, np.abs(omega_2).max()),
-        "energy": (
-            fine.energy - fine.energy[0],
-            coarse.energy - coarse.energy[0],
-            np.zeros(n),
-            fine.terms[:n].max(),
-        ),
+        "theta_2": (question.solution.theta_2, 1.0),
+        "omega_2": (omega_2, np.abs(omega_2).max()),
+        "energy": (np.zeros(n), fine.quantities["terms"][:n].max()),
     }
     rows = []
-    for name, (values, other, right, largest) in compared.items():
+    for name, (right, largest) in compared.items():
+        values, other = (answer.quantities[name] for answer in (fine, coarse))
+        if name == "energy":  # that of the start is anything
+            values = values - values[0]
+            other = other - other[0]
         size = replace_zero_size(np.array(float(largest)))
         error = divide(np.abs(values[:n] - right), size)
         expected = math.nan
@@ -289,7 +289,9 @@ def _make_rows(
         if tolerance.factor > full:
             full, reason = tolerance.factor, tolerance.reason
         allowed = max(full, TIMES_PREDICTED * expected)
-        row = Row.judged(who, name, error, allowed, reason, fine.theta_2[:n])
+        row = Row.judged(
+            who, name, error, allowed, reason, fine.quantities["theta_2"][:n]
+        )
         if not row.error <= full:
             reason = f"{row.error:.1e} where {expected:.1e} was predicted"
             verdict = UNDECIDED if expected >= 1.0 else DEGRADED

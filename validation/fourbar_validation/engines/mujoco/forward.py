@@ -5,7 +5,6 @@ A released linkage is run through time.
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import mujoco
 import numpy as np
@@ -15,7 +14,7 @@ from fourbar.mjcf import RECIPE, write_mjcf
 from fourbar.quantities import Array
 from fourbar.scene import Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import ReleasedAnswer
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.loop import Assembler
 from fourbar_validation.engines.mujoco.closed_loop import FRICTION_ROWS, O2, ClosedLoop
@@ -39,11 +38,10 @@ class MujocoForward:
     def __init__(self, step: float = 1e-3) -> None:
         self.step = step
 
-    def release(self, scene: Scene, times: Array) -> ReleasedAnswer:
+    def release(self, scene: Scene, times: Array) -> Answer:
         """Integrate the motion at the given times, rising from 0 (s)."""
         scene = state_from_pins(scene)
         setting = f"RK4 {self.step:g} s"
-        refuse = partial(ReleasedAnswer.refused, RELEASED, setting)
         start = with_signs(scene.linkage, command_of(scene))
         interval = float(
             times[1] - times[0]
@@ -60,11 +58,12 @@ class MujocoForward:
         try:
             loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
         except InputError as error:
-            return refuse(str(error))
+            return Answer(RELEASED, setting, refusal=str(error))
         theta_2 = float(start.theta_2[0])
         q_0 = Assembler(loop).find(theta_2, int(start.branch[0]))
         if q_0 is None:
-            return refuse("the loop does not close at the start")
+            refusal = "the loop does not close at the start"
+            return Answer(RELEASED, setting, refusal=refusal)
         loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
         loop.set_state(q_0, scene.motion.omega_2 or 0.0)
         rows = []
@@ -76,7 +75,8 @@ class MujocoForward:
             mujoco.mj_forward(loop.model, d)
             terms = np.array([*d.energy, -work.done])
             rows.append((d.qpos[O2], d.qvel[O2], terms.sum(), np.abs(terms).sum()))
-        return ReleasedAnswer(RELEASED, setting, *np.array(rows).T)
+        columns = zip(RELEASED_QUANTITIES, np.array(rows).T, strict=True)
+        return Answer(RELEASED, setting, quantities=dict(columns))
 
 
 class _WorkOnBars:
