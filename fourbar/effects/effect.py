@@ -370,7 +370,7 @@ class Effect(Placed):
         """Apply the effect to the free bodies, from their own motion.
 
         The code is a second derivation. `motion`, `wrenches`: of
-        `engines.free_body_effects`.
+        `engines.free_body`.
         """
         raise NotImplementedError
 

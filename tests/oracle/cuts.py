@@ -22,13 +22,13 @@ from fourbar_validation.compare.pins import (
     state_from_pins,
 )
 from fourbar_validation.compare.tolerance import divide
-from fourbar_validation.engines.free_body import speeds_and_accelerations
-from fourbar_validation.engines.free_body_effects import (
+from fourbar_validation.engines.free_body import (
     BodyWrenches,
     apply_effect,
     apply_load,
     find_arm,
     list_sliding_pins,
+    speeds_and_accelerations,
 )
 from tests.oracle.bounds import CUT
 from tests.oracle.variants import ask_free_bodies, make_row, take_few

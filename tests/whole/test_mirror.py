@@ -47,21 +47,21 @@ fourbar/show/plot/test_plot.py | figures freebody labels linkage_figure style
 fourbar/show/plot/test_plot.py | tolerance_figures view
 # a comparison is tested by engines with given answers
 validation/run/test_judge.py | validation/compare: answer bodies effect_sizes
-validation/run/test_judge.py | command identities judge_engines law question
-validation/run/test_parts.py | plan request
+validation/run/test_judge.py | identities judge_engines law question
+validation/run/test_command_parts.py | plan
 # adapters: judged against printed figures, each other, and faults put in front of
 # them
-validation/engines/test_engines.py | balls description limits loaded loop pinocchio tree
+validation/engines/test_engines.py | description limits pinocchio tree
 validation/engines/test_engines.py | lab/engines: drake exudyn exudyn_elements opensim
 validation/engines/test_engines.py | validation/scenes: random
 validation/engines/test_engines.py | validation/engines/mujoco: closed_loop inverse
 validation/engines/test_guests.py | validation: engine
 validation/engines/test_guests.py | programs workers
-validation/engines/test_free_body.py | free_body_closure free_body_effects sliding
+validation/engines/test_free_body.py | free_body_closure
 validation/scenes/test_hard_families.py | validation/engines/mujoco: shipped
 validation/scenes/test_hard_families.py | bars
 validation/report/test_sections.py | hard_picture
-validation/engines/mujoco/test_simulate.py | defaults monitor
+validation/engines/mujoco/test_simulate.py | monitor
 validation/run/test_released.py | validation/engines/mujoco: forward
 validation/check/test_check.py | calculated fitted
 validation/check/test_check.py | judge_table mistakes theirs variants wrong_scenes
@@ -80,9 +80,8 @@ lab/test_bench.py | contenders
 lab/test_effect_costs.py | tables
 lab/test_stability.py | families slopes tally
 lab/test_faults.py | each fault_scenes injection
-validation/cost/test_cost.py | charts series work_precision
+validation/cost/test_cost.py | charts work_precision
 validation/cost/test_cost.py | validation/advise: clocks
-validation/advise/test_advise.py | judged_setup matters
 lab/test_benchmark.py | lab/simulators: slider_engines slider_mujoco slider_pinocchio
 lab/simulators/test_problems.py | slider_crank
 lab/simulators/test_problems.py | validation/check: problem

@@ -24,7 +24,7 @@ from fourbar.effects import (
     Viscous,
     list_kinds,
 )
-from fourbar_validation.engines import free_body_effects
+from fourbar_validation.engines import free_body
 from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.run.judge import judge
 from tests.support.here import EXACT, THROUGH_TIME
@@ -177,7 +177,7 @@ class FaultyTree:
 def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(name, monkeypatch):
     def faulty(right):
         def act(effect, motion, wrenches):
-            alone = free_body_effects.BodyWrenches(len(motion.theta_2))
+            alone = free_body.BodyWrenches(len(motion.theta_2))
             right(effect, motion, alone)
             for bar in (2, 3, 4):
                 wrenches.push(bar, MORE * alone.force[bar], 0.0)
@@ -186,10 +186,10 @@ def test_a_fault_in_the_wrench_on_the_free_bodies_fails_the_run(name, monkeypatc
         return act
 
     if isinstance(ACTING[name], Load):
-        right = free_body_effects.apply_load
-        monkeypatch.setattr(free_body_effects, "apply_load", faulty(right))
+        right = free_body.apply_load
+        monkeypatch.setattr(free_body, "apply_load", faulty(right))
     else:
-        table = free_body_effects.WRENCH_OF
+        table = free_body.WRENCH_OF
         monkeypatch.setitem(table, name, faulty(table[name]))
     _, quantities = fail_with(name, {"free-body"})
     assert "torque" in quantities

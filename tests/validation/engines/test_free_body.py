@@ -11,7 +11,7 @@ from fourbar import Motion
 from fourbar.effects import Friction, Gravity, Load, Place, Spring, Springs, Torsion
 from fourbar.linkage import PIN_FORCE, PINS
 from fourbar.scene import Scene, command
-from fourbar_validation.engines import free_body, free_body_closure, free_body_effects
+from fourbar_validation.engines import free_body, free_body_closure
 from fourbar_validation.engines.free_body import FreeBody
 from fourbar_validation.engines.registry import ask_at
 from fourbar_validation.engines.sliding import continue_couples, solve_system
@@ -78,7 +78,7 @@ def test_it_imports_the_description_and_nothing_of_the_formulas():
         ),
         *(f"{compare}{name}" for name in ("answer", "bodies", "line", "pins")),
     )
-    for module in (free_body, free_body_closure, free_body_effects):
+    for module in (free_body, free_body_closure):
         modules = imported(Path(module.__file__))
         assert modules
         assert not [name for name in modules if not name.startswith(allowed)]

@@ -23,11 +23,11 @@ from fourbar_validation.engines.description import FORCE_BETWEEN, name_driving
 from fourbar_validation.engines.free_body import (
     DRIVE_COLUMN,
     FORCE_COLUMNS,
+    BodyWrenches,
     solve_wrenches,
     speeds_and_accelerations,
 )
 from fourbar_validation.engines.free_body_closure import cross_products
-from fourbar_validation.engines.free_body_effects import BodyWrenches
 
 _CUTS = {
     "B": ("F43", {2: ("O2", 1.0), 3: ("A", 1.0), 4: ("O4", -1.0)}),
