@@ -69,21 +69,14 @@ _CLOSE_ENOUGH = 1.15
 """Ratio, of the least steps that serve to the most that do not, at which the search
 stops.
 """
-_MOST_TRIALS = 24
 MOST_STEPS_OF_A_RUN = 16_000
 """Most steps of one run, a fifth of a second. An error that needs more steps counts as
 not reachable.
 """
 ROBOTS = (".xml", ".mjcf", ".sdf", ".world", ".urdf")
 """Suffixes of a robot's file."""
-_LEAST_GAIN = 0.8
-"""More steps that leave the error above this part of what it was have met a floor."""
 TIMINGS_OF_A_KIND, STEPS_TIMED, READINGS_TIMED = 5, 200, 30
 """Timings of each kind of step, and what is timed at once."""
-_CHEAPER = 0.97
-"""Part of the work below which a kind of step counts as cheaper. Less is the noise of
-its timing.
-"""
 _LIGHT: dict[str, Any] = {"tolerance": 1e-8, "iterations": 100}
 """Solver of MuJoCo, whose tolerance is tight enough beside a light flywheel."""
 INTEGRATORS_OF_FIRST_ORDER = ("Euler", "implicitfast")
@@ -285,7 +278,9 @@ class _CheapestSearch:
         del steps_of[""]
         for name, seconds in sorted(steps_of.items(), key=lambda pair: pair[1]):
             cost = self.costs[name] = seconds / base
-            allowed = _CHEAPER * min(map(self._work, self._list_served()))
+            # part of the work below which a kind of step counts as cheaper; less is the
+            # noise of its timing
+            allowed = 0.97 * min(map(self._work, self._list_served()))
             # with fewer steps than positions each step has a reading
             steps = max(
                 (allowed - start.readings * self.reading_cost) / cost,
@@ -314,7 +309,7 @@ class _CheapestSearch:
         serves: float | None = None
         fails: float | None = None
         last: SearchRun | None = None
-        for _ in range(_MOST_TRIALS):
+        for _ in range(24):
             attempt = self._try(n, tc, kind)
             ratio = attempt.errors.worst / (PART_OF_THE_ERROR * self.error)
             step = ratio ** (1.0 / ORDER_OF_RK4) if ratio < math.inf else 2.0
@@ -371,10 +366,8 @@ class _CheapestSearch:
 def _is_floored(before: SearchRun, after: SearchRun) -> bool:
     """Tell whether more steps bought nothing."""
     worst = after.errors.worst
-    return (
-        _LEAST_GAIN * before.errors.worst < worst < 1e-2
-        and after.steps > 1.3 * before.steps
-    )
+    # more steps that leave the error above this part of what it was have met a floor
+    return 0.8 * before.errors.worst < worst < 1e-2 and after.steps > 1.3 * before.steps
 
 
 def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:

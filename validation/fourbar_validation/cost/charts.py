@@ -106,8 +106,6 @@ _LOWEST = 1e-17
 """Bottom of the picture."""
 ZERO_TOLERANCE_PLACE = 1e-18
 """Place on the logarithmic axis at which a tolerance of 0 is drawn."""
-PICTURE_WIDTH = 5.0
-"""Width of a picture, in: on a screen of 360 px its texts are still 9 px high."""
 TEXT = 9.5
 
 
@@ -145,7 +143,8 @@ def make_figure(
     """Make a figure with what it means, and what was run, above it."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(PICTURE_WIDTH, height), facecolor=PAPER)
+    # width of a picture, in: on a screen of 360 px its texts are still 9 px high
+    figure = Figure(figsize=(5.0, height), facecolor=PAPER)
     bold: dict[str, Any] = {
         "fontsize": 10.5,
         "weight": "bold",

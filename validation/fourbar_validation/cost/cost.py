@@ -33,7 +33,6 @@ from fourbar_validation.report.sentences import make_words_table, print_sentence
 from fourbar_validation.report.templating import render
 from fourbar_validation.scenes.suites import read_scene_files
 
-_DEFAULT_SCENES = (MODELS / "crank_rocker.toml",)
 COST_HEADINGS = ("setting", "error", "ms per simulated second", "ms a revolution")
 
 
@@ -65,7 +64,7 @@ def cost(
     from rich.console import Console
     from rich.progress import track
 
-    files = read_scene_files(scenes or _DEFAULT_SCENES)
+    files = read_scene_files(scenes or (MODELS / "crank_rocker.toml",))
     fitted: list[ErrorLaw] = []
     for index in range(len(files)):
         name = files.name(index)

@@ -29,19 +29,10 @@ FLOORED = 0.8
 """Part of an error from which on it has met its floor. Twice the steps leave that part
 or more.
 """
-_ABOVE_FLOOR = 3.0
-"""Points within this factor of the floor carry part of it and are not fitted."""
 WITHIN = 0.35
 """An exponent may miss the expected one by this much, or by twice its own uncertainty:
 over two decades of a ladder the next order of the error's series moves a fitted slope
 by about a quarter.
-"""
-FEWEST_FITTED = 3
-"""Points of a fit."""
-_LAWLESS_RISE = 10.0
-"""An error so many times larger than at either of the two coarser settings is no part
-of a law, where it has met no floor: between neighbours of a ladder the laws here change
-it by 10 or less, and downwards.
 """
 _FIRST_ORDER = 1.0
 _FOURTH_ORDER = 4.0
@@ -69,7 +60,8 @@ class ErrorLaw:
     @property
     def decided(self) -> bool:
         """Return whether there are enough points for a fit, or a jump rules it out."""
-        return self.points >= FEWEST_FITTED or bool(self.jumps)
+        # points of a fit
+        return self.points >= 3 or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
@@ -144,7 +136,10 @@ def _describe_jumps(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]
         allowed = before
         if error < LARGEST_LAWFUL_ERROR:
             allowed = max(errors[max(i - 2, 0) : i])
-        if before < LARGEST_LAWFUL_ERROR and not error <= _LAWLESS_RISE * allowed:
+        # an error so many times larger than at either of the two coarser settings is no
+        # part of a law, where it has met no floor: between neighbours of a ladder the
+        # laws here change it by 10 or less, and downwards
+        if before < LARGEST_LAWFUL_ERROR and not error <= 10.0 * allowed:
             yield f"jumps from {before:.1e} to {error:.1e} at {ladder[i].setting}"
 
 
@@ -182,7 +177,8 @@ def _fit_law(
         floor = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
         fitted = {}
         for point, error in zip(ladder, errors, strict=True):
-            if _ABOVE_FLOOR * floor < error < LARGEST_LAWFUL_ERROR:
+            # points within this factor of the floor carry part of it and are not fitted
+            if 3.0 * floor < error < LARGEST_LAWFUL_ERROR:
                 x = point.setting_value
                 fitted[1.0 / x if by_steps else x] = error
         slope = fit([*fitted], [*fitted.values()])
@@ -225,7 +221,6 @@ def find_pareto(points: Sequence[CostPoint], quantity: str) -> list[CostPoint]:
 
 DEFAULT = "MuJoCo's defaults"
 """Label of the point that a new user gets."""
-_DEFAULT_LADDER = "Euler, MuJoCo's defaults"
 ERROR_OF_FOUR_DIGITS = 1e-4
 SIX_DIGITS = 1e-6
 ERROR_IN_WORDS = {ERROR_OF_FOUR_DIGITS: "Four digits", SIX_DIGITS: "Six digits"}
@@ -319,7 +314,7 @@ def _write_defaults(curves: Curves) -> Iterator[str]:
         f" {write_one_digit(errors.torque)} in the torque,"
         f" {write_one_digit(errors.force)} in the worst pin force"
     )
-    ladder = curves.get(_DEFAULT_LADDER, ())
+    ladder = curves.get("Euler, MuJoCo's defaults", ())
     floors = [find_floor(ladder, quantity) or math.inf for quantity in ERROR_NAMES]
     if max(floors) < math.inf:
         text += (

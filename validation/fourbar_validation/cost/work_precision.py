@@ -47,7 +47,6 @@ MIDDLE = 640
 _IMPEDANCES = (0.9, 0.97, 0.99, 0.997, 0.999, 0.9997, 0.9999)
 TIME_CONSTANTS = (3.0, 5.0, 10.0, 20.0, 40.0, 80.0)
 SOLVER_TOLERANCES = (0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6)
-_PADS = (1e-1, 1e-2, 1e-3, 1e-4)
 SLOW = 0.1
 """rad/s at which gravity and loads outweigh inertia, and the loop sags under them."""
 MUJOCO_TIMESTEP = 0.002
@@ -155,7 +154,7 @@ def design_curves(scene: Scene) -> Iterator[SettingCurve]:
     label = "tc = {:g} steps"
     tc_varied = _vary("time_constant_steps", label, TIME_CONSTANTS, WITHOUT_PADS)
     yield SettingCurve("softness tc", tc_varied)
-    pads = _vary("pad", "pads {:g}", _PADS, BEST)
+    pads = _vary("pad", "pads {:g}", (1e-1, 1e-2, 1e-3, 1e-4), BEST)
     yield SettingCurve("pads", (Spot("no pads", replace(BEST, pad=None), x=1.0), *pads))
     for name, bare in (("sag d, slow", False), ("sag d, slow, nothing acts", True)):
         yield SettingCurve(name, _vary_impedance(), slow=True, bare=bare)
@@ -183,12 +182,6 @@ def _vary_defaults(integrator: str, speed: float) -> SettingCurve:
 
 TIMINGS_OF_A_SETTING = 7
 """Timings of each setting."""
-MOST_STEPS_TIMED = 200
-"""Steps per timing: some 3 ms of RK4. A round of a curve then passes within one spell
-of the machine.
-"""
-TIMED_READINGS = 50
-"""Readings per timing."""
 ERRORS_ADVISED = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 2e-9)
 """Errors for which the advice is drawn."""
 STUDY_VERSION = 14
@@ -367,8 +360,11 @@ class CostStudy:
         """
         kinds = [(spot.settings, spot.edit) for spot in spots]
         trials = [setup.try_out(*kind) for kind in kinds]
-        steps = [min(trial.steps, MOST_STEPS_TIMED) or 1 for trial in trials]
-        timings = time_kinds(setup, kinds, steps, TIMED_READINGS, TIMINGS_OF_A_SETTING)
+        # steps per timing: some 3 ms of RK4; a round of a curve then passes within one
+        # spell of the machine
+        steps = [min(trial.steps, 200) or 1 for trial in trials]
+        # readings per timing
+        timings = time_kinds(setup, kinds, steps, 50, TIMINGS_OF_A_SETTING)
         for spot, trial, timed in zip(spots, trials, timings, strict=True):
             (step, scatter), (reading, _) = map(summarise_timings, timed)
             seconds = step * trial.steps + reading * trial.readings

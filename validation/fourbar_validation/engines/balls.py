@@ -66,8 +66,6 @@ position at 1e-20) cancels.
 """
 OF_PIECE = ("table_start", "table_stop", "table_first", "table_last")
 """Angles and factors of the piece of a load's table that a position is in."""
-LINE_ENDS = ("from", "to")
-"""Names of the points between which a linear drive acts."""
 COMMANDED_FIRST = {
     2: ("a", "b", "c"),
     3: ("b", "a", "c"),
@@ -270,7 +268,8 @@ class _Loop:
             self.take(f"I{bar}", find_inertia(stated))
             self.to_centre[bar] = self.polar(find_centre(stated), f"r{bar}")
         drive = scene.drive
-        ends = zip(LINE_ENDS, () if drive is None else drive.ends, strict=False)
+        # names of the points between which a linear drive acts
+        ends = zip(("from", "to"), () if drive is None else drive.ends, strict=False)
         self.ends = [self.spot(place, name) for name, (_, place) in ends]
         if isinstance(drive, PointDrive):
             self.take("direction", drive.direction)

@@ -41,8 +41,6 @@ from fourbar_validation.engines.registry import (
 )
 
 ENGINES_FILE = "engines.toml"
-LARGEST_ENGINES_FILE = 10**6
-"""Bytes."""
 _CACHE = (
     Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fourbar-engines"
 )
@@ -97,7 +95,8 @@ def read_engines(folders: Iterable[Path]) -> dict[str, EngineEntry]:
 
 def read_engines_of(file: Path) -> dict[str, EngineEntry]:
     """Read the engines of one file, by name."""
-    text = read_text(file, "engines", LARGEST_ENGINES_FILE)
+    # bytes
+    text = read_text(file, "engines", 10**6)
     entries: dict[str, EngineEntry] = {}
     try:
         for table in tomllib.loads(text).get("engine", []):

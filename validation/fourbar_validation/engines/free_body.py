@@ -51,11 +51,6 @@ from fourbar_validation.engines.sliding import (
     solve_system,
 )
 
-GREATEST_WINDING = math.pi * (1.0 - 1e-12)
-"""Greatest winding of a spring from rest, rad: half a turn less the rounding of an
-angle of several turns.
-"""
-
 
 class BodyWrenches:
     """Sums of the forces (N) and moments (N m) on the moving bars, (n,) each.
@@ -88,14 +83,6 @@ class BodyWrenches:
         i, j = PINS[pin]
         self.couple(j, couple)
         self.couple(i, -couple)
-
-
-_MEET = 16.0 * 2.0**-52
-"""Part of the lengths below which two points lie in one. The lengths are those by which
-they are reached.
-"""
-FOLLOWED = np.radians(2.0)
-"""Step in which angles are followed from where a motion begins, rad."""
 
 
 def _apply_gravity(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -> None:
@@ -161,7 +148,11 @@ def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -
                 + abs(spring.start.distance)
                 + abs(spring.end.distance)
             )
-            distance = np.where(np.abs(across) <= _MEET * reach, np.nan, np.abs(across))
+            # part of the lengths below which two points lie in one; the lengths are
+            # those by which they are reached
+            distance = np.where(
+                np.abs(across) <= 16.0 * 2.0**-52 * reach, np.nan, np.abs(across)
+            )
             tension = spring.preload + spring.stiffness * (distance - spring.length)
             if spring.acts == "push":
                 tension = np.minimum(tension, 0.0)
@@ -264,7 +255,8 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     link = scene.linkage
     gone = np.zeros(len(motion.theta_2), dtype=bool)
     ends = np.concatenate((begins.theta_2, motion.theta_2))
-    steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
+    # step in which angles are followed from where a motion begins, rad
+    steps = math.ceil(float(np.ptp(ends)) / np.radians(2.0)) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
     closed = close(link, path, find_signs(link, path, scene.motion.branch))
     on_path = np.isin(begins.theta_2, path[closed.assembled])
@@ -280,7 +272,9 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
         turns = np.floor(away[first] / math.tau + 0.5)
-        gone |= np.abs(away[places] - math.tau * turns) > GREATEST_WINDING
+        # greatest winding of a spring from rest, rad: half a turn less the rounding of
+        # an angle of several turns
+        gone |= np.abs(away[places] - math.tau * turns) > math.pi * (1.0 - 1e-12)
     return gone
 
 
@@ -305,10 +299,6 @@ POSITIONS_SOLVED_AT_ONCE = 4096
 """Positions solved at once. At 1.4 kB a matrix, and some four of them at a time, they
 are 22 MB.
 """
-_FRICTION_STARTS = 100
-"""Starts from which other solutions are sought, over six decades of couples."""
-SAME_SOLUTIONS = 1e-6
-"""Relative difference below which two solutions are one."""
 
 
 class FreeBody:
@@ -573,7 +563,8 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
         return 1
     rng = np.random.default_rng(0)
-    n = _FRICTION_STARTS
+    # starts from which other solutions are sought, over six decades of couples
+    n = 100
     size = float((k * np.abs(F)).max()) or 1.0
     x = (
         size
@@ -583,8 +574,9 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
     x, settled, _ = solve_couples(np.tile(F, (n, 1)), np.tile(C, (n, 1, 1)), k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
+        # relative difference below which two solutions are one
         if all(
-            np.abs(loads - other).max() > SAME_SOLUTIONS * max(loads.max(), other.max())
+            np.abs(loads - other).max() > 1e-6 * max(loads.max(), other.max())
             for other in solutions
         ):
             solutions.append(loads)

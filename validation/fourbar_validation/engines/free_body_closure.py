@@ -26,10 +26,6 @@ NEARLY_IN_LINE = 2.0**-26
 """Least angle of the shorter bar with the diagonal at a start, rad: the gap there is as
 small as rounding.
 """
-ROUNDING_OF_FOUR_BARS = 16.0 * 2.0**-52
-"""Gap that the roundings of a sum of four bars can leave, relative to the sum of the
-lengths.
-"""
 
 
 class Closed(NamedTuple):
@@ -66,7 +62,9 @@ def close(
     diagonal = ground + held * np.exp(1j * theta)
     e = np.abs(diagonal)
     phi = np.angle(diagonal)
-    closed = ROUNDING_OF_FOUR_BARS * sum(linkage.lengths)
+    # gap that the roundings of a sum of four bars can leave, relative to the sum of the
+    # lengths
+    closed = 16.0 * 2.0**-52 * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     least_gap = np.maximum(e - (b + c), abs(b - c) - e)
     possible = np.flatnonzero(least_gap <= closed)
@@ -153,10 +151,6 @@ def cross_products(u: Any, v: Any) -> Any:
     return (np.conj(u) * v).imag
 
 
-_STROKE_HALVINGS = 80
-"""Number of times half a turn is halved: beyond the last digit of an angle."""
-
-
 def measure_cylinder(scene: Scene) -> tuple[complex, complex]:
     """Measure from the ground pin of its bar to a cylinder's ends, m.
 
@@ -197,7 +191,8 @@ def find_angle(
 
     low = np.zeros(len(wanted))
     high = np.full(len(wanted), np.pi)
-    for _ in range(_STROKE_HALVINGS):
+    # number of times half a turn is halved: beyond the last digit of an angle
+    for _ in range(80):
         middle = 0.5 * (low + high)
         short = np.abs(across(towards + sense * middle)) < wanted
         low = np.where(short, middle, low)

@@ -73,10 +73,6 @@ NOT_ANSWERED = frozenset(
 """Quantities that no exact engine answers: commanded ones, those that follow from
 others, and those of the formulas alone.
 """
-ROUNDING_OF_THREE_BARS = 16.0 * 2.0**-52
-"""Gap that the roundings of a chain of three bars can leave, relative to the sum of the
-lengths.
-"""
 JointAngles = tuple[float, float, float]
 """Turns of bar 2 at O2, of bar 3 against bar 2 at A, of bar 4 at O4, rad."""
 _CLOSING = {
@@ -109,7 +105,9 @@ class Assembler:
         self.closing = _CLOSING[bar]
         self.near, self.far = (abs(along[other]) for other in self.closing)
         lengths = abs(self.ground), abs(self.along), self.near, self.far
-        self.closed = ROUNDING_OF_THREE_BARS * sum(lengths)
+        # gap that the roundings of a chain of three bars can leave, relative to the sum
+        # of the lengths
+        self.closed = 16.0 * 2.0**-52 * sum(lengths)
 
     def find(self, theta: float, branch: int) -> JointAngles | None:
         """Return the joint angles on the branch, rad, None if the loop does not close.

@@ -55,8 +55,6 @@ def bound_memory(process: int = 0) -> None:
 
 _LIBC = ctypes.CDLL(None) if sys.platform == "linux" else None
 """Loaded before any fork, after which nothing may be loaded."""
-_PR_SET_PDEATHSIG = 1
-"""The option of prctl(2) that sets the parent-death signal."""
 
 
 def set_parent_death_signal() -> None:
@@ -65,7 +63,8 @@ def set_parent_death_signal() -> None:
     Only Linux has this signal; elsewhere nothing happens.
     """
     if _LIBC is not None:
-        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        # the option of prctl(2) that sets the parent-death signal
+        _LIBC.prctl(1, signal.SIGKILL)
 
 
 def end_with_parent() -> None:
@@ -210,8 +209,6 @@ def find_reason(errors: str) -> str:
     return lines[-1].strip() if lines else ""
 
 
-_PYTHON_FRAME = re.compile(r'^ *File "(.+)", (line \d+)', re.MULTILINE)
-"""A place in a file, as a traceback of Python names it."""
 OUTPUT_KEPT = 20_000
 """Bytes that are kept of one answer's output. Half are from its beginning, half from
 its end.
@@ -311,10 +308,6 @@ LONGEST_ANSWER, _BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""
 MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
-_KILLED = (-9, 137)
-"""Exit status of a program that was killed: its own, or its shell's."""
-ENDING_SECONDS = 5.0
-"""Seconds for a program that is told to end; then it is killed."""
 _Message = dict[str, Any]
 """A question or an answer, as an object of JSON."""
 Ask = Callable[[_Message, int], _Message]
@@ -513,11 +506,14 @@ class Running:
         reason = find_reason(errors)
         if reason:
             said = f": {write_one_line(reason)}"
-            for place in _PYTHON_FRAME.findall(errors)[-1:]:
+            # A place in a file, as a traceback of Python names it
+            places = re.findall(r'^ *File "(.+)", (line \d+)', errors, re.MULTILINE)
+            for place in places[-1:]:
                 said += f" ({', '.join(place)})"
         else:
             said = ""
-        if status in _KILLED:
+        # exit status of a program that was killed: its own, or its shell's
+        if status in (-9, 137):
             return _KilledError(f"was killed{said}")
         if status >= 0:
             how = f"exit status {status}"
@@ -544,7 +540,8 @@ def _stop(process: "subprocess.Popen[bytes]") -> None:
     """End a program and what it started in its session."""
     _signal(process, "SIGTERM")
     with suppress(subprocess.TimeoutExpired):
-        process.wait(ENDING_SECONDS)
+        # seconds for a program that is told to end; then it is killed
+        process.wait(5.0)
     _signal(process, "SIGKILL")
     process.wait()
 

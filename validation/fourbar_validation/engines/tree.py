@@ -36,14 +36,8 @@ if TYPE_CHECKING:
     from fourbar.effects import ForceDrive
     from fourbar.effects.place import Place
 
-FRICTION_PASSES = 100
-"""Passes over pin loads and the friction they make. Each lessens the error where the
-friction is far from a jam.
-"""
 REPEATED = 4.0 * 2.0**-52
 """Change of a pin load, in parts of the greatest, that is rounding."""
-_DIVERGED = 1e100
-"""Load, N, that only passes running away from each other reach."""
 Components = tuple[float, float]
 """A vector of the plane as plain numbers, as an engine's calls take it. Everywhere else
 vectors are complex numbers, x + i y.
@@ -259,12 +253,15 @@ class Loaded(Assembled, Protocol):
         if not self.loaded:
             return forces
         on_pins = without
-        for _ in range(FRICTION_PASSES):
+        # passes over pin loads and the friction they make; each lessens the error where
+        # the friction is far from a jam
+        for _ in range(100):
             before = loads
             loads = np.abs(on_pins)
             if np.abs(loads - before).max() <= REPEATED * loads.max():
                 return forces
-            if not loads.max() < _DIVERGED:
+            # load, N, that only passes running away from each other reach
+            if not loads.max() < 1e100:
                 break
             forces, on_pins = passed(loads)
         probe = float(np.abs(without).max())

@@ -26,21 +26,6 @@ SCENE_SECONDS = 180.0
 """A scene takes 0.05 to 3 s, one released for 100 s some 50 s of processor time; what
 takes longer than this, on a machine that does other work too, hangs.
 """
-_IN_FLIGHT = 4
-"""Tasks submitted per worker: enough that it is always busy, few enough that the memory
-stays bounded.
-"""
-_LOCKED = 10.0
-"""Seconds for which a worker waits for the pipe that all workers share.
-
-A worker that is killed while it reads or writes there leaves the pipe locked for good:
-the others then wait twice as long, and the run ends and can be resumed. A message takes
-milliseconds.
-"""
-_ENDED_BY_PEBBLE = ("Task timeout",)
-"""First argument of the TimeoutError of an item that took too long. One that an item
-raises itself has another.
-"""
 Task = tuple[int, Sequence[Any]]
 """Number and items."""
 Attempt = Callable[[Any], Any]
@@ -63,7 +48,11 @@ def prepare_worker(_: object = None) -> None:
     """
     from pebble import CONSTS
 
-    CONSTS.channel_lock_timeout = _LOCKED
+    # seconds for which a worker waits for the pipe that all workers share; a worker
+    # that is killed while it reads or writes there leaves the pipe locked for good: the
+    # others then wait twice as long, and the run ends and can be resumed; a message
+    # takes milliseconds
+    CONSTS.channel_lock_timeout = 10.0
     end_with_parent()
     open_no_windows()
     bound_memory()
@@ -116,10 +105,12 @@ class _PoolOfItems:
         return future.result() if error is None else error
 
     def _is_too_soon(self, error: BaseException | None, since: float) -> bool:
+        # first argument of the TimeoutError of an item that took too long; one that an
+        # item raises itself has another
         return (
             self.seconds is not None
             and isinstance(error, TimeoutError)
-            and error.args[:1] == _ENDED_BY_PEBBLE
+            and error.args[:1] == ("Task timeout",)
             and time.monotonic() - since < self.seconds
         )
 
@@ -172,7 +163,9 @@ def apply_over_processes(
             for number, items in tasks:
                 waiting = [items_of.submit(item) for item in items]
                 in_flight.append((number, items, waiting))
-                if len(in_flight) > _IN_FLIGHT * workers:
+                # tasks submitted per worker: enough that it is always busy, few enough
+                # that the memory stays bounded
+                if len(in_flight) > 4 * workers:
                     yield items_of.finish(*in_flight.popleft())
             for submitted in in_flight:
                 yield items_of.finish(*submitted)

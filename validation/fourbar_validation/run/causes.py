@@ -27,17 +27,6 @@ from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
 """Positions, in a row, by which a mistake is looked for."""
-MOST_POSITIONS_OF_FRICTION = 30
-"""The same, about the first that differs, where each trial looks for friction that
-balances the forces it follows.
-"""
-_NO_CAUSE = {*NOT_JUDGED, "drive_condition"}
-"""Quantities by which no mistake is looked for: under friction the condition follows
-the forces.
-"""
-SAME_NUMBERS = 1e-9
-"""Part of a quantity's largest value within which a mistake must give an exact engine's
-numbers: it was made in another order of summation than the hypothesis."""
 
 
 def find_causes(
@@ -55,7 +44,9 @@ def find_causes(
     if at is None or answer.assembled is None:
         return None
     scene = state_from_pins(question.scene)
-    slack = max(SAME_NUMBERS, tolerance.factor * (not tolerance.conditioned))
+    # part of a quantity's largest value within which a mistake must give an exact
+    # engine's numbers: it was made in another order of summation than the hypothesis
+    slack = max(1e-9, tolerance.factor * (not tolerance.conditioned))
     try:
         regular = question.solution.status_code == OK
 
@@ -71,9 +62,9 @@ def find_causes(
         labels = [column.label for column, rows in wrong.items() if rows.any()]
         if any(effect.loaded_pins for effect in scene.effects):
             any_wrong = np.logical_or.reduce(list(wrong.values()))
-            judge, wrong = judge_rows(
-                choose_rows(any_wrong, MOST_POSITIONS_OF_FRICTION)
-            )
+            # positions about the first that differs: there each trial looks for
+            # friction that balances the forces it follows
+            judge, wrong = judge_rows(choose_rows(any_wrong, 30))
         differing = [column for column, rows in wrong.items() if rows.any()]
         if not differing:
             return None
@@ -141,7 +132,9 @@ def make_answer_table(
     place = TheirColumn(angle, exact, exact, Unit("rad", 1.0))
     columns = {}
     for name, numbers in answer.quantities.items():
-        if name in UNITS and name not in _NO_CAUSE:
+        # quantities by which no mistake is looked for: under friction the condition
+        # follows the forces
+        if name in UNITS and name not in {*NOT_JUDGED, "drive_condition"}:
             values = np.array(numbers[rows], dtype=float)
             values[blank] = np.nan
             columns[name] = TheirColumn(values, exact, exact, Unit(UNITS[name], 1.0))

@@ -70,10 +70,6 @@ POSITIONS_OF_FRICTION = 5
 """Positions of a scene that are tried for solutions of friction. Some have several,
 some one; each may take a search.
 """
-_WHOLE_TURNS = (2.0 * np.pi, 4.0 * np.pi)
-"""Ends of a sweep of an input that turns fully, rad: with a single change point its
-assembly repeats after two turns.
-"""
 TOO_NEAR_A_TOGGLE = 1e-6
 """|sin(theta_4 - theta_3)| below which doubles have no word in it."""
 
@@ -104,7 +100,9 @@ def _check_sweep(question: Question) -> Row:
     linkage = question.scene.linkage
     start = float(command.theta_2[0])
     stop = float(command.theta_2[-1])
-    if start == 0.0 and stop in _WHOLE_TURNS:
+    # ends of a sweep of an input that turns fully, rad: with a single change point its
+    # assembly repeats after two turns
+    if start == 0.0 and stop in (2.0 * np.pi, 4.0 * np.pi):
         missed = np.maximum(-compute_closing_margin(linkage, command.theta_2), 0.0)
     else:
         left_out = min(np.radians(1.0), 0.5 * (stop - start))

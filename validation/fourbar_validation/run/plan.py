@@ -36,10 +36,6 @@ SCENES_OF_A_SLOW_TASK = 1
 """Scenes per task if something is simulated or drawn: a second each."""
 SCENES_OF_A_QUICK_TASK = 20
 """Scenes per task otherwise: a second together."""
-_MOST_TASKS = 10_000
-"""Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
-_MOST_KEPT_NAMED = 5
-"""Scenes whose kept answers a resumed run names; further ones are counted."""
 REQUEST_FILE = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
@@ -245,7 +241,9 @@ class Plan:
         count = len(self.suite)
         slow = self.draw_at_once or any(one.through_time for one in self.engines)
         least = SCENES_OF_A_SLOW_TASK if slow else SCENES_OF_A_QUICK_TASK
-        size = max(least, math.ceil(count / _MOST_TASKS))
+        # each has a file while the run goes on; of a million scenes a hundred stand in
+        # one
+        size = max(least, math.ceil(count / 10_000))
         scenes = range(count)
         return [scenes[start : start + size] for start in scenes[::size]]
 
@@ -291,7 +289,8 @@ class Plan:
 
     def _tell_kept(self, scenes: Sequence[int]) -> str:
         """Say which answers of an interrupted run are kept."""
-        names = [escape_controls(self.suite.name(i)) for i in scenes[:_MOST_KEPT_NAMED]]
+        # scenes whose kept answers a resumed run names; further ones are counted
+        names = [escape_controls(self.suite.name(i)) for i in scenes[:5]]
         more = len(scenes) - len(names)
         listed = ", ".join(names) + f" and {more} more" * bool(more)
         return (

@@ -63,8 +63,6 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.run.question import NotAskedError, Question, spread_evenly
 
-POSITIONS_STATED_OTHERWISE = 5
-"""Positions of a scene that are stated otherwise."""
 TURNED = 0.75
 """Angle by which a scene is turned, rad: of few bits, so that sums with it are seldom
 rounded. A rounded theta_2 is another one.
@@ -75,8 +73,6 @@ PART, MASSES_APART = 0.3, 0.4
 """Part of a bar's mass that is split off, and the distance of both parts. The distance
 is in radii of gyration of the bar.
 """
-_AT_A_REVERSAL = 1e-3
-"""Part of its speeds below which a pin with dry friction may reverse."""
 _FORCES = (*PIN_FORCES, "torque", "drive_force")
 _TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
@@ -257,11 +253,12 @@ def _take_plain_positions(question: Question) -> _Few:
     in_line = link.ground_angle + np.array([0.0, math.pi])
     if scene.counts_turns and mark_touching(link, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
+    # part of its speeds below which a pin with dry friction may reverse
     fit = (
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
-        & ~question.reversing(_AT_A_REVERSAL)
+        & ~question.reversing(1e-3)
     )
     posed = pose(link, [solution.theta_2, solution.theta_3, solution.theta_4])
     for effect in placed.effects:
@@ -274,7 +271,8 @@ def _take_plain_positions(question: Question) -> _Few:
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
-    chosen = spread_evenly(indices, POSITIONS_STATED_OTHERWISE)
+    # positions of a scene that are stated otherwise
+    chosen = spread_evenly(indices, 5)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     bars = [
         Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))

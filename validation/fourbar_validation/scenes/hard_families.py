@@ -37,13 +37,11 @@ HEAVY_BARS = Ranges(
 Scenes = Iterator[tuple[str, Scene]]
 _ROCKERS = (DrawnType.DOUBLE_ROCKER, DrawnType.TRIPLE_ROCKER)
 TYPES_WITH_A_CRANK = DrawnType.CRANK_ROCKER
-TYPES_WITH_A_ROCKER = DrawnType.TRIPLE_ROCKER
 REGULAR = (0.5, 0.4, 0.3)
 """rad from the singular position: positions that set the scale of each quantity."""
 TOGGLE = tuple(10.0**-k for k in range(1, 13))
 NEAR_DISTANCES = (1e-1, 3e-2, 1e-2, 3e-3)
 """rad; as far as a simulation in time follows."""
-_POLE = tuple(10.0**-k for k in range(1, 10))
 ORDINARY_LENGTHS = (0.3, 0.1, 0.25, 0.22)
 """Lengths of an ordinary crank-rocker, m."""
 CHANGE = tuple(10.0**-k for k in range(1, 9))
@@ -186,7 +184,7 @@ def _list_both_sides(distances: tuple[float, ...]) -> Array:
 
 def _approach_poles(bar: int) -> Scenes:
     """Approach from both sides positions where the driven bar 3 or 4 stands still."""
-    offsets = _list_both_sides(_POLE)
+    offsets = _list_both_sides(tuple(10.0**-k for k in range(1, 10)))
     for seed in range(2):
         lengths = draw_lengths_of_type(TYPES_WITH_A_CRANK, seed)
         scene = dress(lengths, seed)
@@ -334,7 +332,7 @@ def scale_loads(*, exponents: tuple[int, ...] = (-9, -3, 3, 9)) -> Scenes:
 def _sweep_out_and_back() -> Scenes:
     """Sweep out of the range in which the linkage assembles, and back."""
     for seed in range(2):
-        lengths = draw_lengths_of_type(TYPES_WITH_A_ROCKER, seed)
+        lengths = draw_lengths_of_type(DrawnType.TRIPLE_ROCKER, seed)
         scene = dress(lengths, seed)
         (psi, stretched), *_ = find_collinear_3_4(lengths)
         outward = 1.0 if stretched else -1.0

@@ -62,7 +62,6 @@ def draw_product(*draws: Draw) -> Draw:
 _ANY_ANGLE = draw_uniform(-math.pi, math.pi)
 _ANY_PART = draw_uniform(0.0, 1.0)
 _EITHER_SIGN = draw_uniform(-1.0, 1.0)
-_ANY_SPEED = draw_decades(-1.0, 2.0)
 
 
 PUSHED = 0.2
@@ -89,7 +88,7 @@ class Ranges:
     """Distance from G at which a load acts, in parts of the length."""
     without_force: float = 0.0
     """Share of the loads that are a moment alone."""
-    speed: Draw = _ANY_SPEED
+    speed: Draw = draw_decades(-1.0, 2.0)
     """|omega_2|, rad/s."""
     acceleration: Draw = _EITHER_SIGN
     """alpha_2 where there is one, of omega_2 squared."""

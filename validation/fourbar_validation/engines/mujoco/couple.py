@@ -13,27 +13,9 @@ import numpy as np
 
 from fourbar_validation.engines.mujoco.closed_loop import solve_couple
 
-_REFINEMENTS = 3
-"""Secant steps after the first: each gains the digits that the one before has."""
 LEAST_ACCELERATION = 1e-6
 """Acceleration of the driven joint, over that of the open tree's joints, that is not
 told from none.
-"""
-_MISSED = 1e-9
-"""Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,
-also near a change point.
-"""
-SOLVER_NOISE = 1e-3
-"""Part of it that the noise of the file's solver may leave. Where the acceleration
-jumps, all of it is left.
-"""
-LARGEST_TRIAL = 1e8
-"""N m or N: beside a heavy flywheel a larger trial is no number for MuJoCo, which takes
-controls up to 1e10.
-"""
-_DOUBLINGS = 40
-"""Times that a trial's size is doubled in search of a couple, to both sides. Beyond
-1e12 times the size nothing is found.
 """
 
 
@@ -59,9 +41,14 @@ def find_couple(
     speed = float(np.abs(data.qvel).max())
     others = max(float(np.abs(data.qacc_smooth).max()), speed * speed) or 1.0
     sought = max(abs(wanted - free), LEAST_ACCELERATION * others)
-    trial = min(float(model.dof_M0.sum()) * sought, LARGEST_TRIAL)
-    couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)
-    if couple is None or abs(acceleration(couple) - wanted) <= _MISSED * sought:
+    # N m or N: beside a heavy flywheel a larger trial is no number for MuJoCo, which
+    # takes controls up to 1e10
+    trial = min(float(model.dof_M0.sum()) * sought, 1e8)
+    # secant steps after the first: each gains the digits that the one before has
+    couple = solve_couple(acceleration, wanted, 0.0, trial, 3)
+    # part of the acceleration sought that a linear solve may leave; its rounding is
+    # 1e-12, also near a change point
+    if couple is None or abs(acceleration(couple) - wanted) <= 1e-9 * sought:
         return couple
     # the solver starts from the same accelerations at every trial, or its noise would
     # look like a jump
@@ -71,7 +58,9 @@ def find_couple(
         data.qacc_warmstart[:] = start
         return acceleration(size)
 
-    bracketed = bracket_couple(repeatable, wanted, trial, SOLVER_NOISE * sought)
+    # part of it that the noise of the file's solver may leave; where the acceleration
+    # jumps, all of it is left
+    bracketed = bracket_couple(repeatable, wanted, trial, 1e-3 * sought)
     if bracketed is None:
         return math.nan
     return bracketed
@@ -99,7 +88,9 @@ def bracket_couple(
     if sought == 0.0:
         return 0.0
     above = below = 0.0
-    for doubling in range(_DOUBLINGS):
+    # times that a trial's size is doubled in search of a couple, to both sides; beyond
+    # 1e12 times the size nothing is found
+    for doubling in range(40):
         size = abs(trial) * 2.0**doubling
         for nearer, farther in ((above, size), (below, -size)):
             if miss(farther) * sought <= 0.0:

@@ -26,7 +26,6 @@ from fourbar_validation.engines.mujoco.robots.closures import describe_equality
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
 
 Described = dict[str, ModelEntry]
-NONE_IN_WORDS = "none"
 UNLIMITED_RANGE = "free"
 """Range of a pin that no stop ends."""
 _GROUND_PINS = ("O2", "O4")
@@ -74,8 +73,6 @@ _MJCF_WORDS = {
     "NEWTON": "Newton",
 }
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
-PARALLEL_AXES = 1e-9
-"""rad; axes that are nearer to each other are parallel but for rounding."""
 STIFFEST = 0.9999
 """Greatest impedance that MuJoCo lets a constraint have."""
 
@@ -101,7 +98,8 @@ class _Description:
         self.described: Described = {}
         skew = seen.loop.misaligned
         self.put("plane", seen.plane)
-        self.put("skew", skew if skew > PARALLEL_AXES else 0.0)
+        # rad; axes that are nearer to each other are parallel but for rounding
+        self.put("skew", skew if skew > 1e-9 else 0.0)
         # those of a parallelogram or kite within the digits of the file, else its own
         lengths = seen.loop.met if seen.loop.rounding else seen.loop.lengths
         for name, length in zip(BAR_NAMES.values(), lengths, strict=True):
@@ -209,7 +207,7 @@ class _Description:
         self.put("closure.by", seen.closed_by)
         self.put("closure.out of plane", seen.measure_offset())
         names = (describe_equality(model, one) for one in seen.loop.other_equalities)
-        self.put("other equalities", ", ".join(names) or NONE_IN_WORDS)
+        self.put("other equalities", ", ".join(names) or "none")
         if not model.eq_active0[number]:
             return
         kind = seen.closed_by.partition(" ")[0]

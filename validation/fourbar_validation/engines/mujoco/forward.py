@@ -22,11 +22,6 @@ from fourbar_validation.engines.mujoco.runner import Stepper
 
 RELEASED = "mujoco-forward"
 """Name of the engine."""
-CLOSURE_TIMESTEPS = 2.0
-"""Time constant of the loop's closure, in timesteps. Through change points the closure
-takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three hundred times as much
-with 10.
-"""
 
 
 class MujocoForward:
@@ -47,11 +42,14 @@ class MujocoForward:
             times[1] - times[0]
         )  # the times are evenly spaced; the step divides the interval
         timestep = interval / math.ceil(interval / self.step - 1e-6)
+        # time constant of the loop's closure, in timesteps; through change points the
+        # closure takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three
+        # hundred times as much with 10
         settings = replace(
             RECIPE,
             flywheel=0.0,
             timestep=timestep,
-            time_constant_steps=CLOSURE_TIMESTEPS,
+            time_constant_steps=2.0,
             pad=None,
         )
         bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))

@@ -37,12 +37,6 @@ from fourbar_validation.engines.tree import put_back, solve_closed, solve_multip
 
 RESIDUALS = ("acceleration_gap", "power_gap", "force_gap")
 """Residuals of motion and forces that `ResidualMonitor` measures."""
-_FORCE_RESIDUALS = ("power_gap", "force_gap")
-"""Residuals relative to forces, whose terms may cancel."""
-_EXCUSED = 1e-3
-"""A solver's residual excuses an error of this part of a force, not more."""
-_ROUNDINGS = 4.0
-"""Roundings of the flywheel's torque, which is taken away from what drives it."""
 _LIMITS = {
     "bad_states": (
         0.0,
@@ -88,7 +82,8 @@ def list_alarms(
     seen = {**evidence, "closure_gap": evidence["closure_gap_m"] / size}
     alarms = {}
     for name, (limit, reason) in _LIMITS.items():
-        most = limit * factor if name in _FORCE_RESIDUALS else limit
+        # residuals relative to forces, whose terms may cancel
+        most = limit * factor if name in ("power_gap", "force_gap") else limit
         if name in seen and not seen[name] <= most:
             alarms[name] = f"{name} = {seen[name]:.1e} > {most:g}: {reason}"
     return alarms
@@ -188,12 +183,14 @@ class ResidualMonitor:
             size = float(np.linalg.norm(seen.answer[name]))
             if name == COUPLE.value:
                 size = max(size, float(np.linalg.norm(seen.needed)))
-            expected[name] += min(error, _EXCUSED * size)
+            # A solver's residual excuses an error of this part of a force, not more
+            expected[name] += min(error, 1e-3 * size)
         # the drive does what the flywheel's torque leaves; their powers are compared
         flywheel = read.model.dof_armature[O2] * a[O2]
         with np.errstate(divide="ignore", invalid="ignore"):
             rounding = abs(float(flywheel / (seen.drive @ rates)))
-        expected[self.drive] += _ROUNDINGS * EPS * rounding
+        # roundings of the flywheel's torque, which is taken away from what drives it
+        expected[self.drive] += 4.0 * EPS * rounding
         return expected
 
     def _keep(

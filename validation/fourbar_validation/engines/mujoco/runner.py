@@ -183,10 +183,6 @@ class RunCourse:
         return compute_least_sine(self.scene.linkage, self.command.theta_2, closes)
 
 
-LIGHT_FLYWHEEL = 1e4
-"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's
-softness small, light enough that the torque it needs does not drown in its rounding.
-"""
 Found = tuple[float, float, float] | None
 """Own joint angles (O2, A, O4), None where the loop does not close."""
 
@@ -265,7 +261,10 @@ class SimulatedRun:
         if course.scene.drive_bar != 2:
             flywheel = 0.0
             if settings.pad is not None:
-                flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
+                # flywheel of the model that gives T3 or T4: heavy enough to keep the
+                # closure's softness small, light enough that the torque it needs does
+                # not drown in its rounding
+                flywheel = min(settings.flywheel, 1e4)
             self.light = compile_loop(replace(settings, flywheel=flywheel))
         wound = unwind(course.scene, start)
         self.turns = wound[O2] - start[O2]

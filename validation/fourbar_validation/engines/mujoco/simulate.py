@@ -66,10 +66,6 @@ COMPUTED_BY_MUJOCO = (
     "assembly, velocities at the start, the motion through time, accelerations, drive"
     " torque, pin forces"
 )
-LONGEST_STEP_OF_A_CHECK = np.radians(2.0)
-"""Greatest step between positions at which the loop is tried for closure, rad."""
-_OF_TENDON = ("stroke", "stroke_speed")
-"""Quantities of a cylinder that MuJoCo has."""
 _RESIDUALS = (
     "closure_gap_m",
     "speed_error",
@@ -177,8 +173,9 @@ class _Simulation:
         self.supplied = evaluate_loads(scene)
         n = len(self.command.angle)
         unknowns = list_unknowns(scene)
+        # quantities of a cylinder that MuJoCo has
         self.out = make_blank(
-            n, [*MADE, *unknowns, *(_OF_TENDON if scene.drive else ())]
+            n, [*MADE, *unknowns, *(("stroke", "stroke_speed") if scene.drive else ())]
         )
         self.branch = self.command.branch.copy()
         self.evidence = dict.fromkeys(_RESIDUALS, 0.0)
@@ -269,7 +266,8 @@ class _Simulation:
     ) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
         start, stop = self.command.angle[[one, second]]
-        pieces = int(np.ceil(abs(stop - start) / LONGEST_STEP_OF_A_CHECK))
+        # greatest step between positions at which the loop is tried for closure, rad
+        pieces = int(np.ceil(abs(stop - start) / np.radians(2.0)))
         branch = int(self.command.branch[one])
         return all(
             position.find(theta, branch) is not None
