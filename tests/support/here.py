@@ -6,7 +6,7 @@ from fourbar_validation.engines.registry import ENGINES
 from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.run import question
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Progress
+from fourbar_validation.run.run import Progress
 
 EXACT = [engine for engine in ENGINES if not engine.through_time]
 THROUGH_TIME = [engine for engine in ENGINES if engine.through_time]

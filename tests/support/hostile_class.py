@@ -41,7 +41,7 @@ class Releases(Right):
         self.step = step
 
     def release(self, scene, times):
-        from fourbar_validation.engines.mujoco.forward import MujocoForward
+        from fourbar_validation.engines.mujoco.runner import MujocoForward
 
         return MujocoForward(self.step).release(scene, times)
 

@@ -14,12 +14,12 @@ from pytest import fixture, mark, raises
 from fourbar import effects, errors, mjcf
 from fourbar.files import dump, loads
 from fourbar_validation.compare import effect_sizes as in_scales
-from fourbar_validation.engines import applied_effects as on_trees
 from fourbar_validation.engines import free_body
+from fourbar_validation.engines import tree as on_trees
 from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.checkout import ROOT, read, run_python
-from tests.validation.engines.test_applied_effects import (
+from tests.validation.engines.test_tree import (
     EXACT,
     ON_TREES,
     outcome,

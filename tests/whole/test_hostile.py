@@ -23,11 +23,10 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import LONGEST_CELL, read_columns
 from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines import environments, programs, registry
+from fourbar_validation.engines import guests, programs, registry
 from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
-from fourbar_validation.run.plan import Plan
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import Plan, run
 from fourbar_validation.scenes.suites import LARGEST_LIST, read_suite
 from tests.support.checkout import read_complaint
 from tests.support.here import judge_here
@@ -53,7 +52,7 @@ STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters, but for the ends of lines."""
 ACTIVE = re.compile('<script>alert|<img src=x|" onmouseover="')
 """What a browser would run."""
-EXACT = environments.choose_engines("free-body")
+EXACT = guests.choose_engines("free-body")
 FORMS = ("markdown", "html", "junit")
 
 
@@ -261,7 +260,7 @@ def test_a_system_that_sets_no_limit_of_memory_goes_on_without(monkeypatch):
 def test_running_out_of_memory_costs_its_own_row(tmp_path, monkeypatch):
     suite = read_suite(listed(tmp_path, "a.toml\nb.toml\n"))
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
-        monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
+        monkeypatch.setattr(f"fourbar_validation.run.run.{size}", 2)
     greedy = registry.Engine("greedy", Greedy, EQUIVALENCE)
     run(Plan(suite, (*EXACT, greedy), workers=1, drawn=False), tmp_path / "run")
     rows = list(read_columns(tmp_path / "run" / "results.csv"))

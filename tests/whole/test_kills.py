@@ -24,13 +24,12 @@ from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
-from fourbar_validation.engines.environments import choose_engines
+from fourbar_validation.engines.guests import choose_engines
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import hash_modules
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run import plan as plan_module
-from fourbar_validation.run.plan import COLLECTING, Plan
-from fourbar_validation.run.run import run
+from fourbar_validation.run import run as plan_module
+from fourbar_validation.run.run import COLLECTING, Plan, run
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import (
@@ -58,7 +57,7 @@ KILLS_OF_BLAME = 4
 COUNT, IN_A_TASK = (220, 20) if FULL else (30, 3)
 """Scenes of a run, none of them drawn, and those of a task."""
 SMALL = (
-    "import fourbar_validation.run.plan as plan; plan.SCENES_OF_A_QUICK_TASK ="
+    "import fourbar_validation.run.run as plan; plan.SCENES_OF_A_QUICK_TASK ="
     f" {IN_A_TASK}; "
 )
 HARNESS = (
@@ -80,7 +79,7 @@ def judge_all(suite, out, engines=EXACT, workers=2):
 @mark.timeout(300)  # every new worker imports the harness again
 def test_an_engine_that_crashes_or_hangs_costs_its_own_rows(tmp_path, monkeypatch):
     for size in ("SCENES_OF_A_SLOW_TASK", "SCENES_OF_A_QUICK_TASK"):
-        monkeypatch.setattr(f"fourbar_validation.run.plan.{size}", 2)
+        monkeypatch.setattr(f"fourbar_validation.run.run.{size}", 2)
     moody = Engine("moody", Moody, EQUIVALENCE)
     # s; a busy machine is given longer
     monkeypatch.setattr(workers, "SCENE_SECONDS", 2.0 * BUSY)
@@ -376,7 +375,7 @@ def test_of_a_long_suite_what_fails_has_pictures_and_what_is_nearest_to_it(
         return judge(job)
 
     monkeypatch.setattr(plan_module, "judge_job", noting)
-    for module in ("report.run_summary", "run.plan"):
+    for module in ("report.run_summary", "run.run"):
         monkeypatch.setattr(f"fourbar_validation.{module}.PICTURED", 3)
     monkeypatch.setattr("fourbar_validation.run.run.write_html", lambda *_, **__: "")
     blunders = Engine("blunders", Blunders, EQUIVALENCE)

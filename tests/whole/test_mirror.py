@@ -48,13 +48,12 @@ fourbar/show/plot/test_plot.py | tolerance_figures view
 # a comparison is tested by engines with given answers
 validation/run/test_judge.py | validation/compare: answer bodies effect_sizes
 validation/run/test_judge.py | identities judge_engines law question
-validation/run/test_command_parts.py | plan
 # adapters: judged against printed figures, each other, and faults put in front of
 # them
-validation/engines/test_engines.py | description limits pinocchio tree
+validation/engines/test_engines.py | description limits pinocchio
 validation/engines/test_engines.py | lab/engines: drake exudyn exudyn_elements opensim
 validation/engines/test_engines.py | validation/scenes: random
-validation/engines/test_engines.py | validation/engines/mujoco: closed_loop inverse
+validation/engines/test_engines.py | validation/engines/mujoco: inverse
 validation/engines/test_guests.py | validation: engine
 validation/engines/test_guests.py | programs workers
 validation/engines/test_free_body.py | free_body_closure
@@ -62,7 +61,6 @@ validation/scenes/test_hard_families.py | validation/engines/mujoco: shipped
 validation/scenes/test_hard_families.py | bars
 validation/report/test_sections.py | hard_picture
 validation/engines/mujoco/test_simulate.py | monitor
-validation/run/test_released.py | validation/engines/mujoco: forward
 validation/check/test_check.py | calculated fitted
 validation/check/test_check.py | judge_table mistakes theirs variants wrong_scenes
 validation/robots/test_check_mjcf.py | differences guard judge_loop

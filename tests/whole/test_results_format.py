@@ -11,7 +11,7 @@ from fourbar.quantities import LINE_QUANTITIES, QUANTITIES
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
-from fourbar_validation.engines.environments import choose_engines
+from fourbar_validation.engines.guests import choose_engines
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.registry import (
     ENGINES,
@@ -22,9 +22,8 @@ from fourbar_validation.engines.registry import (
 from fourbar_validation.regression.changes import WHOLE_ENGINE
 from fourbar_validation.regression.record import ACCEPTED, find_baseline
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.released import FORWARD, RELEASED_ERRORS
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import Plan, run
 from fourbar_validation.scenes.random import DrawnType
 from fourbar_validation.scenes.suites import Random
 from tests.support.checkout import find_lines, read

@@ -24,7 +24,6 @@ from pydrake.multibody.tree import (
 from fourbar.errors import LimitError
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
@@ -32,7 +31,7 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
 )
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree
+from fourbar_validation.engines.tree import Tree, has_term, list_wrenches
 
 _BY_SPEEDS = JacobianWrtVariable.kV
 UP = (0.0, 0.0, 1.0)

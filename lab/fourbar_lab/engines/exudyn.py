@@ -38,7 +38,6 @@ from fourbar.linkage import MOVING_BARS, PIN_FORCE
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_lab.engines.exudyn_elements import ELEMENT_OF, ExudynBodies
-from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
     find_unknown,
@@ -47,7 +46,7 @@ from fourbar_validation.engines.description import (
 )
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.sliding import solve_refined
-from fourbar_validation.engines.tree import BarValues, Loaded
+from fourbar_validation.engines.tree import BarValues, Loaded, has_term, list_wrenches
 
 EXUDYN_SIZE = 9
 """Coordinates, and constraints."""

@@ -2,7 +2,7 @@
 
 No other engine brings force laws of its own that hold to round-off. MuJoCo's hold to
 the error of its steps; every other engine is given the wrenches of
-`applied_effects.TERM_OF`, as Exudyn is of all the rest.
+`tree.TERM_OF`, as Exudyn is of all the rest.
 """
 
 import math

@@ -19,7 +19,6 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar_validation.compare.pins import resolve
-from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     ON_BARS,
     find_unknown,
@@ -29,7 +28,7 @@ from fourbar_validation.engines.description import (
 )
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.sliding import solve_refined
-from fourbar_validation.engines.tree import BarValues, Loaded
+from fourbar_validation.engines.tree import BarValues, Loaded, has_term, list_wrenches
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 """Zero vector."""

@@ -45,7 +45,7 @@ from tests.support.scenes import (
     relink,
     thesis,
 )
-from tests.validation.engines.test_applied_effects import ACTING, scene
+from tests.validation.engines.test_tree import ACTING, scene
 
 ENGINE = {
     engine.name: engine

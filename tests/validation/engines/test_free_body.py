@@ -18,7 +18,7 @@ from fourbar_validation.engines.sliding import continue_couples, solve_system
 from fourbar_validation.scenes.random import draw_random_scene
 from tests.support.rows import read_rows
 from tests.support.scenes import EPS, bare, crank_rocker
-from tests.validation.engines.test_applied_effects import ACTING
+from tests.validation.engines.test_tree import ACTING
 from tests.whole.test_imports import imported
 
 DIGITS = 50.0 * EPS

@@ -19,9 +19,8 @@ from fourbar_validation.compare.rows import AGREES, DEGRADED, FAILS, REFUSES
 from fourbar_validation.engines import guests, programs, registry
 from fourbar_validation.run.command import Request, select_engines
 from fourbar_validation.run.judge import judge
-from fourbar_validation.run.plan import Plan
 from fourbar_validation.run.question import FREE_BODY
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import Plan, run
 from fourbar_validation.scenes.suites import read_scene_files
 from tests.support.guests import (
     end_guests,

@@ -22,7 +22,7 @@ from fourbar.scene.motion import BRANCH_NAMES, Motion
 from fourbar.solving import solve
 from fourbar_validation.compare.rows import AGREES, DEGRADED
 from fourbar_validation.compare.tolerance import SIMULATED, wrap_difference
-from fourbar_validation.engines.mujoco import couple as couples
+from fourbar_validation.engines.mujoco import closed_loop as couples
 from fourbar_validation.engines.mujoco.robots import inside
 from fourbar_validation.engines.mujoco.robots.measure import (
     measure_loops,

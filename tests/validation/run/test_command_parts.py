@@ -13,8 +13,8 @@ from pytest import MonkeyPatch, fixture, mark, raises
 from fourbar.errors import BAD_INPUT, HOLDS, InputError
 from fourbar_validation.cli import status
 from fourbar_validation.places import MODELS
-from fourbar_validation.run import plan
-from fourbar_validation.run.plan import read_part
+from fourbar_validation.run import run as plan
+from fourbar_validation.run.run import read_part
 from fourbar_validation.run.store import Store
 from tests.support.here import judge_here
 
@@ -61,7 +61,7 @@ def test_a_run_over_all_parts_in_one_folder_writes_the_report(run):
         assert not (out / "results.csv").exists()
     assert len(list((out / "parts").iterdir())) == 4
     with MonkeyPatch.context() as patch:
-        patch.setattr("fourbar_validation.run.plan.judge_job", judge_nothing)
+        patch.setattr("fourbar_validation.run.run.judge_job", judge_nothing)
         run("out")
     assert not (out / "request.json").exists() and not (out / "parts").exists()
     whole = Path(run("whole"))

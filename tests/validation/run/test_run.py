@@ -15,8 +15,7 @@ from fourbar_validation.engines.registry import Engine
 from fourbar_validation.regression.record import describe_run, open_run
 from fourbar_validation.report.run_summary import Summary
 from fourbar_validation.report.scene_record import Record
-from fourbar_validation.run.plan import Job, Plan, _judge_by_engine
-from fourbar_validation.run.run import run
+from fourbar_validation.run.run import Job, Plan, _judge_by_engine, run
 from tests.support.here import judge_here
 from tests.support.runs import changed, save_run
 from tests.support.unlucky import Few
@@ -42,7 +41,7 @@ def run_against(tmp_path, monkeypatch):
     def run_records(before, *records, engine=OF_MINE, **suite):
         by_name = {record.name: record for record in records}
         monkeypatch.setattr(
-            "fourbar_validation.run.plan.judge_job", lambda job: by_name[job.name]
+            "fourbar_validation.run.run.judge_job", lambda job: by_name[job.name]
         )
         same_suite = replace(MINE, settings=MINE.settings | {"scenes of": "few"})
         saved = open_run(save_run(tmp_path / "before", before, about=same_suite))

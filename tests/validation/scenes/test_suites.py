@@ -9,8 +9,8 @@ from itertools import combinations
 import pytest
 
 import fourbar
-from fourbar_validation.engines.applied_effects import TERM_OF
 from fourbar_validation.engines.guests import list_needs
+from fourbar_validation.engines.tree import TERM_OF
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.scenes.suites import read_default_suite

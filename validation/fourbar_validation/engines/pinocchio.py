@@ -17,14 +17,13 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene, command, with_signs
 from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
-from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     PIN_OF_MOVING_BAR,
     find_unknown,
     list_moving_parts,
 )
 from fourbar_validation.engines.loop import Assembler, Exact
-from fourbar_validation.engines.tree import Tree, solve_closed
+from fourbar_validation.engines.tree import Tree, has_term, list_wrenches, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

@@ -14,8 +14,7 @@ import click
 from fourbar.errors import HOLDS, DependencyError, InputError, write_count
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.results_file import read_columns
-from fourbar_validation.engines.environments import choose_engines, fill_table
-from fourbar_validation.engines.guests import adjust_engines
+from fourbar_validation.engines.guests import adjust_engines, choose_engines, fill_table
 from fourbar_validation.engines.registry import Engine, hold_fully
 from fourbar_validation.regression.accept import (
     FORMS,
@@ -25,15 +24,17 @@ from fourbar_validation.regression.accept import (
 from fourbar_validation.regression.record import PARQUET_FILE, find_baseline, open_run
 from fourbar_validation.report.junit import list_cases, write_document
 from fourbar_validation.report.run_summary import Summary
-from fourbar_validation.run.plan import (
+from fourbar_validation.run.run import (
     REQUEST_FILE,
     WORKERS,
     Plan,
     Progress,
+    open_store,
     read_part,
+    run,
     show_progress,
+    write_outcome,
 )
-from fourbar_validation.run.run import open_store, run, write_outcome
 from fourbar_validation.run.store import Store
 from fourbar_validation.scenes.hard_families import Hard
 from fourbar_validation.scenes.random import UNEVEN_TYPE, DrawnType

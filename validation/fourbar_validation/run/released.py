@@ -53,7 +53,7 @@ from fourbar_validation.run.question import Question, select_positions, take_mem
 
 FORWARD = {
     "mujoco-forward": (
-        Later(f"{ENGINES_PACKAGE}.mujoco.forward:MujocoForward"),
+        Later(f"{ENGINES_PACKAGE}.mujoco.runner:MujocoForward"),
         "mujoco",
     ),
     "pinocchio-forward": (

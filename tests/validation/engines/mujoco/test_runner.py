@@ -19,7 +19,7 @@ from fourbar_validation.run.judge import judge
 from tests.support.here import THROUGH_TIME
 from tests.support.rows import slow_but
 from tests.support.scenes import crank_rocker
-from tests.validation.engines.test_applied_effects import ACTING
+from tests.validation.engines.test_tree import ACTING
 
 KINK = 1e-5
 """rad; where the cubic pieces of a law meet within a step of RK4 the motion errs by

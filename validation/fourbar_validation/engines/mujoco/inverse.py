@@ -15,7 +15,6 @@ from fourbar.errors import LimitError
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array
 from fourbar.scene import Scene
-from fourbar_validation.engines.applied_effects import has_term, list_wrenches
 from fourbar_validation.engines.description import (
     MovingPart,
     find_unknown,
@@ -23,7 +22,7 @@ from fourbar_validation.engines.description import (
 )
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree
+from fourbar_validation.engines.tree import Tree, has_term, list_wrenches
 
 
 def find_limit_met(parts: Iterable[MovingPart]) -> str:

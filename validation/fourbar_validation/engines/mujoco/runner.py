@@ -11,6 +11,9 @@ bar's direction or of the stroke,
 
 are solved for the acceleration of the input from MuJoCo's own state at each stage,
 which the motor of its flywheel is given.
+
+A released linkage is run through time by MuJoCo's forward dynamics of the generated
+MJCF without its flywheel.
 """
 
 import math
@@ -24,13 +27,16 @@ import mujoco
 import numpy as np
 
 from fourbar.effects import Table
-from fourbar.errors import LimitError
+from fourbar.errors import InputError, LimitError
 from fourbar.linkage import copy_with
 from fourbar.mjcf import RECIPE, Settings, choose_run, write_mjcf
 from fourbar.mjcf.model import unwind
 from fourbar.quantities import Array, Indices, Mask
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, with_signs
+from fourbar.scene import command as command_of
 from fourbar.scene.motion import Motion
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
+from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
     find_from_middle,
     list_speeds,
@@ -39,7 +45,7 @@ from fourbar_validation.engines.description import (
 from fourbar_validation.engines.free_body_closure import find_angle
 from fourbar_validation.engines.limits import compute_least_sine
 from fourbar_validation.engines.loop import Assembler
-from fourbar_validation.engines.mujoco.closed_loop import O2, ClosedLoop
+from fourbar_validation.engines.mujoco.closed_loop import FRICTION_ROWS, O2, ClosedLoop
 from fourbar_validation.engines.tree import solve_closed
 
 INSTANTS_OF_A_LAW = 2000
@@ -552,3 +558,100 @@ def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
         yield
     finally:
         mujoco.set_mjcb_act_bias(before)
+
+
+RELEASED = "mujoco-forward"
+"""Name of the engine."""
+
+
+class MujocoForward:
+    """Free motion of the closed loop with a fixed step, s."""
+
+    name = RELEASED
+    version = mujoco.__version__
+
+    def __init__(self, step: float = 1e-3) -> None:
+        self.step = step
+
+    def release(self, scene: Scene, times: Array) -> Answer:
+        """Integrate the motion at the given times, rising from 0 (s)."""
+        scene = state_from_pins(scene)
+        setting = f"RK4 {self.step:g} s"
+        start = with_signs(scene.linkage, command_of(scene))
+        interval = float(
+            times[1] - times[0]
+        )  # the times are evenly spaced; the step divides the interval
+        timestep = interval / math.ceil(interval / self.step - 1e-6)
+        # time constant of the loop's closure, in timesteps; through change points the
+        # closure takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three
+        # hundred times as much with 10
+        settings = replace(
+            RECIPE,
+            flywheel=0.0,
+            timestep=timestep,
+            time_constant_steps=2.0,
+            pad=None,
+        )
+        bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))
+        try:
+            loop = ClosedLoop(write_mjcf(bare, settings, keyframe=False))
+        except InputError as error:
+            return Answer(RELEASED, setting, refusal=str(error))
+        theta_2 = float(start.theta_2[0])
+        q_0 = Assembler(loop).find(theta_2, int(start.branch[0]))
+        if q_0 is None:
+            refusal = "the loop does not close at the start"
+            return Answer(RELEASED, setting, refusal=refusal)
+        loop.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+        loop.set_state(q_0, scene.motion.omega_2 or 0.0)
+        rows = []
+        stepper = Stepper(loop.model, loop.data, timestep)
+        work = _WorkOnBars(loop.model, loop.data, timestep)
+        d = loop.data
+        for t in times:
+            stepper.to(float(t), work.add)
+            mujoco.mj_forward(loop.model, d)
+            terms = np.array([*d.energy, -work.done])
+            rows.append((d.qpos[O2], d.qvel[O2], terms.sum(), np.abs(terms).sum()))
+        columns = zip(RELEASED_QUANTITIES, np.array(rows).T, strict=True)
+        return Answer(RELEASED, setting, quantities=dict(columns))
+
+
+class _WorkOnBars:
+    """Work of loads, damping and dry friction on the bars, J.
+
+    MuJoCo's own powers at the ends of each step are summed up.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        timestep: float,
+    ) -> None:
+        self.model = model
+        self.data = data
+        self.timestep = timestep
+        self.done = 0.0
+        damped = model.dof_damping.any() or model.tendon_damping.any()
+        dry = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+        self.any = bool(model.nu or damped or dry)
+        mujoco.mj_forward(model, data)
+        self.before = self._compute_power()
+
+    def add(self, _: float) -> None:
+        """Add the step just made.
+
+        After a Runge-Kutta step some fields are still of the step before.
+        """
+        if self.any:
+            mujoco.mj_forward(self.model, self.data)
+            now = self._compute_power()
+            self.done += 0.5 * self.timestep * (self.before + now)
+            self.before = now
+
+    def _compute_power(self) -> float:
+        d = self.data
+        rubbing = np.isin(d.efc_type, FRICTION_ROWS)
+        power = float(d.qvel @ (d.qfrc_actuator + d.qfrc_damper))
+        return power + float(d.efc_force[rubbing] @ d.efc_vel[rubbing])

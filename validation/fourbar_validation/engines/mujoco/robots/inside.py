@@ -39,8 +39,7 @@ from fourbar.scene import Scene, command, find_signs
 from fourbar.scene.motion import OPEN
 from fourbar_validation.engines.description import FORCE_AT, FORCE_BETWEEN
 from fourbar_validation.engines.free_body_closure import close
-from fourbar_validation.engines.mujoco.closed_loop import WARNINGS
-from fourbar_validation.engines.mujoco.couple import find_couple
+from fourbar_validation.engines.mujoco.closed_loop import WARNINGS, find_couple
 from fourbar_validation.engines.mujoco.robots.ancestry import (
     find_bits,
     find_tied_bodies,

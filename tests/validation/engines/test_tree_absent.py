@@ -12,7 +12,7 @@ from fourbar_validation.run.judge import judge
 from tests.support.robots import forward
 from tests.support.rows import read_rows
 from tests.support.scenes import UNIFORM, crank_rocker
-from tests.validation.engines.test_applied_effects import ACTING
+from tests.validation.engines.test_tree import ACTING
 
 BARE = {"contact", "limit", "island", "sensor", "spring", "damper", "frictionloss"}
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fourbar_validation.engines.mujoco.couple import bracket_couple
+from fourbar_validation.engines.mujoco.closed_loop import bracket_couple
 
 
 def test_a_couple_that_nothing_gives_is_none():
