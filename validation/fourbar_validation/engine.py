@@ -23,6 +23,7 @@ from fourbar_validation.compare.answer import Answer, explain_refusal
 from fourbar_validation.compare.rows import say_error
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.guests import NOT_FOUND, adjust_engines, hash_files
+from fourbar_validation.engines.programs import Message
 from fourbar_validation.engines.registry import list_engines
 from fourbar_validation.places import PACKAGE
 from fourbar_validation.report.machine import DISTRIBUTIONS
@@ -39,7 +40,7 @@ class _NotFoundError(Exception):
     """Error raised if there is no such engine."""
 
 
-def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
+def open_engine(entry: str) -> tuple[_Factory, Message]:
     """Return what makes an engine, and its hello.
 
     Raises _NotFoundError where there is none.
@@ -77,7 +78,7 @@ def open_engine(entry: str) -> tuple[_Factory, dict[str, Any]]:
 
 def _apply_setting(
     engine: Any,
-    setting: dict[str, Any],
+    setting: Message,
     names: Sequence[str],
 ) -> Any:
     """Return the engine with a setting.
@@ -94,7 +95,7 @@ def _apply_setting(
     return engine
 
 
-def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
+def _open_class(entry: str) -> tuple[_Factory, Message]:
     module, _, name = entry.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
@@ -104,7 +105,7 @@ def _open_class(entry: str) -> tuple[_Factory, dict[str, Any]]:
         if getattr(error, "name", None) in (module, module.partition(".")[0], name):
             raise _NotFoundError(say_error(error)) from None
         raise
-    hello: dict[str, Any] = {
+    hello: Message = {
         "engine": getattr(served, "name", None),
         "answers": getattr(served, "quantities", UNKNOWNS),
         "commands": getattr(served, "commands", ("theta_2",)),
@@ -153,7 +154,7 @@ def _hash_code(module: str) -> str:
     )
 
 
-def answer(make: _Factory, question: dict[str, Any]) -> dict[str, Any]:
+def answer(make: _Factory, question: Message) -> Message:
     """Answer one question."""
     scene = protocol.scene_from_json(question["scene"])
     if question["ask"] == "release":

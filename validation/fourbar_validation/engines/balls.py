@@ -32,11 +32,14 @@ from fourbar_validation.engines.description import (
     find_unknown,
 )
 from fourbar_validation.engines.loop import read_each
+from fourbar_validation.engines.prediction import Sizes
 
 Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any
 """A vector of the plane, x + i y, of two balls."""
 BallValues: TypeAlias = dict[str, Ball]
+OfBars: TypeAlias = dict[int, Ball]
+VectorsOfBars: TypeAlias = dict[int, ComplexBall]
 Spot: TypeAlias = tuple[int, ComplexBall]
 """A place on a bar: the bar, and a vector from its first pin."""
 
@@ -213,8 +216,8 @@ class _Wrenches:
 
     def __init__(self) -> None:
         bars = (1, *MOVING_BARS)
-        self.force: dict[int, ComplexBall] = dict.fromkeys(bars, acb(0))
-        self.moment: dict[int, Ball] = dict.fromkeys(bars, arb(0))
+        self.force: VectorsOfBars = dict.fromkeys(bars, acb(0))
+        self.moment: OfBars = dict.fromkeys(bars, arb(0))
 
     def push(self, bar: int, force: ComplexBall, point: ComplexBall) -> None:
         """Add a force at a point."""
@@ -242,20 +245,20 @@ class _Loop:
     Bars are numbered as everywhere, the ground is bar 1.
     """
 
-    w: dict[int, ComplexBall]
+    w: VectorsOfBars
     """Unit vectors along the bars."""
-    sines: dict[int, Ball]
+    sines: OfBars
     """Sine between the two other moving bars, by bar; 3 and 4 turn by it over their
     lengths where 2 turns by its own.
     """
-    tip: dict[int, ComplexBall]
+    tip: VectorsOfBars
     """Vectors from the first pin to the second."""
-    first_pin: dict[int, ComplexBall]
+    first_pin: VectorsOfBars
     """Places of the first pins."""
-    centre: dict[int, ComplexBall]
+    centre: VectorsOfBars
     """Places of the mass centres."""
-    omega: dict[int, Ball]
-    alpha: dict[int, Ball]
+    omega: OfBars
+    alpha: OfBars
 
     def __init__(self, scene: Scene, inputs: BallValues) -> None:
         self.scene = scene
@@ -331,7 +334,7 @@ class _Loop:
         x["lever"] = across / s / max(reach, length)
         return True
 
-    def pose(self, w: dict[int, ComplexBall]) -> None:
+    def pose(self, w: VectorsOfBars) -> None:
         """Place the bars along unit vectors."""
         x = self.x
         self.w = {1: polar_ball(arb(1), x["theta_1"]), **w}
@@ -355,7 +358,7 @@ class _Loop:
         first, second = (bar for bar in MOVING_BARS if bar != commanded)
         across = wedge(side[first], side[second])
 
-        def rates(stated: Ball, total: ComplexBall) -> dict[int, Ball]:
+        def rates(stated: Ball, total: ComplexBall) -> OfBars:
             """Solve for the rates of the other bars.
 
             The sum of i side rate is `total`.
@@ -372,7 +375,7 @@ class _Loop:
         pull = sum((side[bar] * square(self.omega[bar]) for bar in MOVING_BARS), zero)
         self.alpha = rates(x[f"alpha_{commanded}"], x.get("jerk", zero) + pull)
 
-    def velocity(self, omega: dict[int, Ball], spot: Spot) -> ComplexBall:
+    def velocity(self, omega: OfBars, spot: Spot) -> ComplexBall:
         """Return the velocity of a point of a bar at angular speeds."""
         bar, point = spot
         v = acb(0, omega[bar]) * (point - self.first_pin[bar])
@@ -385,7 +388,7 @@ class _Loop:
         a = turned * (point - self.first_pin[bar])
         return a + self.acceleration((2, self.tip[2])) if bar == 3 else a
 
-    def compute_power(self, on: _Wrenches, omega: dict[int, Ball]) -> Ball:
+    def compute_power(self, on: _Wrenches, omega: OfBars) -> Ball:
         """Compute the power of wrenches at angular speeds.
 
         A wrench about O2 acts on the point of its bar that lies there.
@@ -613,7 +616,7 @@ class Responses:
         """Compute the outputs at changed inputs."""
         return compute_outputs(self.scene, self.branch, self.inputs | changed)
 
-    def add(self, total: dict[str, float], **changed: Ball) -> bool:
+    def add(self, total: Sizes, **changed: Ball) -> bool:
         """Add how far each output moves with changed inputs, in parts of 2^-STEP_BITS.
 
         An output that becomes singular moves infinitely far. False where the loop does
@@ -632,7 +635,7 @@ class Responses:
             total[output] = total.get(output, 0.0) + rate
         return True
 
-    def add_of_inputs(self, total: dict[str, float], weights: dict[str, float]) -> None:
+    def add_of_inputs(self, total: Sizes, weights: Sizes) -> None:
         """Add how far each output moves as each input moves by its weight.
 
         The side is one on which the loop closes.
@@ -701,7 +704,7 @@ def compute_exact_sines(linkage: FourBar, command: Command) -> Array:
     x = make_ball_lengths(linkage)
     x["theta_1"] = arb(linkage.ground_angle)
 
-    def read(theta: float, branch: int, *_: float) -> dict[str, float] | None:
+    def read(theta: float, branch: int, *_: float) -> Sizes | None:
         closed = compute_directions(x | {"theta_2": arb(theta)}, branch)
         if closed is None:
             return None

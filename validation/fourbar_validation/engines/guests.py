@@ -39,7 +39,13 @@ from fourbar_validation.compare.tolerance import EQUIVALENCE, ErrorBound, hold_s
 from fourbar_validation.engines import protocol
 from fourbar_validation.engines.description import name_drive
 from fourbar_validation.engines.prediction import predict_for_any_method
-from fourbar_validation.engines.programs import Ask, Program, Running, run_to_end
+from fourbar_validation.engines.programs import (
+    Ask,
+    Message,
+    Program,
+    Running,
+    run_to_end,
+)
 from fourbar_validation.engines.registry import (
     BALLS,
     LAB_FOLDERS,
@@ -66,6 +72,7 @@ STATED_BY_THE_ENGINE = "as the engine states"
 """Class of the tolerance that a guest states itself."""
 COMMANDED_NAMES = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 _Read = TypeVar("_Read")
+Texts = tuple[str, ...]
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
 
 
@@ -74,13 +81,13 @@ class Hello:
     """First message of an engine, which states what it answers, checked."""
 
     name: str
-    answers: tuple[str, ...] = COMPARED_QUANTITIES
-    commands: tuple[str, ...] = ("theta_2",)
-    effects: tuple[str, ...] = ()
+    answers: Texts = COMPARED_QUANTITIES
+    commands: Texts = ("theta_2",)
+    effects: Texts = ()
     tolerance: ErrorBound = EQUIVALENCE
     version: str = ""
     code: str = ""
-    settings: tuple[str, ...] = ()
+    settings: Texts = ()
     device: str = ""
     made_for: str = ""
 
@@ -96,7 +103,7 @@ class Guest(Engine):
     """Number of the engine, so that it is drawn with the same mark in every process."""
     seconds: float | None = None
     """Time limit for each question."""
-    effects: tuple[str, ...] = ()
+    effects: Texts = ()
     """Words of the hello's `effects`."""
     setting: str = ""
     """Name of the setting with which it is asked, one of those that its hello lists."""
@@ -306,14 +313,14 @@ def ask_hello(program: Program) -> Hello:
         running.end()
 
 
-def _read_hello(data: dict[str, Any]) -> Hello:
+def _read_hello(data: Message) -> Hello:
     """Check the hello of an engine; InputError names what is wrong."""
 
     def texts(
         name: str,
-        default: tuple[str, ...] = (),
+        default: Texts = (),
         allowed: Sequence[str] | None = None,
-    ) -> tuple[str, ...]:
+    ) -> Texts:
         values = data.get(name, list(default))
         if not isinstance(values, list) or not all(
             isinstance(value, str) for value in values
@@ -394,12 +401,12 @@ class GuestClient:
     hello: Hello
     trouble: str = ""
     """Why the hello was not read."""
-    setting: dict[str, Any] = field(default_factory=dict)
+    setting: Message = field(default_factory=dict)
     step: float | None = None
     """Step of a released motion, s."""
 
     @property
-    def commands(self) -> tuple[str, ...]:
+    def commands(self) -> Texts:
         """Return the names of what it can be commanded by."""
         return COMMANDED_NAMES if self.trouble else self.hello.commands
 
@@ -451,7 +458,7 @@ class GuestClient:
         self,
         what: str,
         scene: Scene,
-        data: dict[str, Any],
+        data: Message,
         positions: int,
         read: Callable[[Any], _Read],
     ) -> _Read:
@@ -497,9 +504,9 @@ class EngineEntry:
     name: str
     adapter: str = ""
     """One of our adapters, or module:Class."""
-    command: tuple[str, ...] = ()
+    command: Texts = ()
     """Command line of a foreign program, which takes the adapter's place."""
-    requires: tuple[str, ...] = ()
+    requires: Texts = ()
     """Requirements that pip installs."""
     python: str = ""
     """Another interpreter than this one."""
@@ -560,7 +567,7 @@ def _read_entry(table: object) -> EngineEntry:
             raise InputError(f"engine.{key}", value, allowed)
     if bool(table.get("adapter")) == bool(table.get("command")):
         raise InputError("engine", table["name"], "must have an adapter or a command")
-    stated: dict[str, Any] = {
+    stated: Message = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in table.items()
     }
@@ -649,7 +656,7 @@ def start_engine(
     (guest,) = name_guests([(entry.adapter or entry.name, entry.name, program)], taken)
     if like is not None:
         guest = replace(guest, **{name: getattr(like, name) for name in _KEPT_FIELDS})
-    setting: dict[str, Any] = {"name": entry.setting} if entry.setting else {}
+    setting: Message = {"name": entry.setting} if entry.setting else {}
     if entry.steps:
         setting["steps_per_turn"] = entry.steps[-1]
     return guest.at_setting(**setting) if setting else guest

@@ -23,7 +23,13 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
 )
 from fourbar_validation.engines.loop import Assembler, Exact
-from fourbar_validation.engines.tree import Tree, has_term, list_wrenches, solve_closed
+from fourbar_validation.engines.tree import (
+    Components,
+    Tree,
+    has_term,
+    list_wrenches,
+    solve_closed,
+)
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -113,7 +119,7 @@ class PinocchioTree(Tree):
 
     def needed(
         self,
-        field: tuple[float, float],
+        field: Components,
         wrenches: dict[int, list[float]],
     ) -> list[float]:
         """Compute recursive Newton-Euler.

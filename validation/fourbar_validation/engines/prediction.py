@@ -40,6 +40,8 @@ from fourbar_validation.compare.tolerance import (
 )
 from fourbar_validation.engines.description import list_speeds
 
+Sizes = dict[str, float]
+"""Sizes of inputs or outputs, by their names."""
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
 LARGEST_FIRST_ORDER = 0.1
@@ -181,15 +183,15 @@ def _bound_touching(
 class Sensitivities(NamedTuple):
     """Change of each output at one position, by cause."""
 
-    data: dict[str, float]
+    data: Sizes
     """Sensitivity to the data, |y| + sum w_i |dy/dx_i|. For the condition it is its
     value.
     """
-    loop: dict[str, float]
+    loop: Sizes
     """Change by a loop that opens at its fastest bar's speed and acceleration times
     1 m, and by couples on the bars of the strongest pin force times 1 m.
     """
-    carried: dict[str, float]
+    carried: Sizes
     """Change by couples on the bars: 1 kg m^2 at the fastest bar's acceleration."""
 
     def first_order(
@@ -246,8 +248,8 @@ def _compute_sensitivity(
     stored = {name: float(value) for name, value in exact.items()}
     responses.add_of_inputs(data, _weigh_inputs(stored))
     data["condition"] = float(base["condition"].mid())
-    loop: dict[str, float] = {}
-    carried: dict[str, float] = {}
+    loop: Sizes = {}
+    carried: Sizes = {}
     if "omega_3" in base:
         fastest = max(abs(base[f"omega_{bar}"]) for bar in MOVING_BARS)
         hardest = max(abs(base[f"alpha_{bar}"]) for bar in MOVING_BARS)
@@ -272,7 +274,7 @@ def _compute_sensitivity(
     return Sensitivities(data, loop, carried)
 
 
-def _weigh_inputs(stored: dict[str, float]) -> dict[str, float]:
+def _weigh_inputs(stored: Sizes) -> Sizes:
     """Return the size of each stored input, of which one rounding is a part of EPS.
 
     A chain of bars meets O4 as its longest bar is rounded, whatever the ground's

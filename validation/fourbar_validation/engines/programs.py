@@ -308,9 +308,9 @@ LONGEST_ANSWER, _BYTES_PER_POSITION = 10**6, 10**4
 """Bytes of an answer: ten times as many as all quantities take."""
 MOST_ERRORS = 10**8
 """Bytes that a program may write to its standard error for one answer."""
-_Message = dict[str, Any]
+Message = dict[str, Any]
 """A question or an answer, as an object of JSON."""
-Ask = Callable[[_Message, int], _Message]
+Ask = Callable[[Message, int], Message]
 """Function that asks a question about a number of positions."""
 
 
@@ -351,10 +351,10 @@ class Running:
 
     def ask_again(
         self,
-        question: _Message,
+        question: Message,
         positions: int,
         greet: Callable[[Ask], None] | None = None,
-    ) -> _Message:
+    ) -> Message:
         """Ask, and ask once more a program that was killed; one that fails is ended.
 
         `greet` asks what a program that is started must be asked first, and raises
@@ -368,10 +368,10 @@ class Running:
 
     def _greet_and_ask(
         self,
-        question: _Message,
+        question: Message,
         positions: int,
         greet: Callable[[Ask], None] | None,
-    ) -> _Message:
+    ) -> Message:
         try:
             if greet is not None and self._process is None:
                 greet(self._ask)
@@ -380,7 +380,7 @@ class Running:
             self.end()
             raise
 
-    def _ask(self, question: _Message, positions: int) -> _Message:
+    def _ask(self, question: Message, positions: int) -> Message:
         """Send a question and return the object that answers it.
 
         The object may say why it has no answer.
@@ -417,7 +417,7 @@ class Running:
             answered.set()
             self._take_errors()
 
-    def _read(self, reply: bytes) -> _Message:
+    def _read(self, reply: bytes) -> Message:
         """Read a line; EngineError where it is not the answer that was asked for."""
         said = _quote(reply)
         try:
@@ -562,7 +562,7 @@ def _quote(reply: bytes, place: int = 0) -> str:
     return "... " * bool(start) + write_one_line(kept)
 
 
-def _make_object(pairs: list[tuple[str, Any]]) -> _Message:
+def _make_object(pairs: list[tuple[str, Any]]) -> Message:
     data = dict(pairs)
     if len(data) < len(pairs):
         raise ValueError("a key stands twice")

@@ -44,6 +44,7 @@ from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer, Engin
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.compare.tolerance import OF_THE_COMMAND
+from fourbar_validation.engines.programs import Message
 
 PROTOCOL = 4
 """Number of the contract; a change that an engine must know of raises it."""
@@ -72,7 +73,7 @@ class _NumberEntry(Entry):
         return super().refuse(re.sub('"1 (.+?)"', r"1 (in \1)", allowed))
 
 
-def scene_to_json(scene: Scene) -> dict[str, Any]:
+def scene_to_json(scene: Scene) -> Message:
     """Write lengths, bars, drive, loads and effects of a scene.
 
     Raises InputError for an effect that no scene file holds. Every place is a pair from
@@ -80,7 +81,7 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
     it. Points, the place of a moment alone and strokes of gas springs, which change no
     answer, are left out.
     """
-    bars: dict[str, Any] = {
+    bars: Message = {
         BAR_NAMES[number]: Bar(
             bar.length,
             find_mass(bar),
@@ -90,7 +91,7 @@ def scene_to_json(scene: Scene) -> dict[str, Any]:
         for number, bar in zip(MOVING_BARS, scene.linkage.moving, strict=True)
     }
     plain = replace(scene, linkage=replace(scene.linkage, **bars))
-    tables: dict[str, Any] = _take_numbers(list_scene_tables(state_from_pins(plain)))
+    tables: Message = _take_numbers(list_scene_tables(state_from_pins(plain)))
     for load in tables["loads"]:
         if "force" not in load:
             load.pop("from_pin", None)
@@ -123,7 +124,7 @@ def scene_from_json(data: Any) -> Scene:
         raise (error if error.file else error.in_file("scene")) from None
 
 
-def command_to_json(scene: Scene, command: Command) -> dict[str, Any]:
+def command_to_json(scene: Scene, command: Command) -> Message:
     """Write what is commanded: place, speed, acceleration and branch.
 
     The place is an angle or a stroke.
@@ -164,9 +165,7 @@ def command_from_json(scene: Scene, data: Any) -> tuple[Scene, Command]:
     n = len(places)
     branch = _read_branch(data.get("branch", 1), n)
     rates = zip(names[1:], (omega, alpha), strict=True)
-    stated: dict[str, Any] = {
-        name: rate for name, rate in rates if isinstance(rate, float)
-    }
+    stated: Message = {name: rate for name, rate in rates if isinstance(rate, float)}
     if of_stroke:
         stated["side"] = data.get("side")
     stated |= {names[0]: places, "branch": int(branch[0])}
@@ -198,7 +197,7 @@ def _find_names(data: Any) -> tuple[str, str, str]:
     return stated[0]
 
 
-def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
+def _refuse_unknown(data: Message, allowed: tuple[str, ...]) -> None:
     for name, value in data.items():
         if name not in allowed:
             raise InputError(
@@ -209,7 +208,7 @@ def _refuse_unknown(data: dict[str, Any], allowed: tuple[str, ...]) -> None:
 
 
 def _read_motion(
-    names: tuple[str, str, str], data: dict[str, Any], n: int | None = None
+    names: tuple[str, str, str], data: Message, n: int | None = None
 ) -> tuple[Array, float | Array | None, float | Array | None]:
     """Read places, speed and acceleration; None where a rate is not stated."""
     places = _read_numbers(f"command.{names[0]}", data[names[0]], n)
@@ -329,14 +328,14 @@ def answer_to_json(
     scene: Scene,
     command: Command | None,
     answer: Answer,
-) -> dict[str, Any]:
+) -> Message:
     """Write an answer, without the engine's name, which its hello states.
 
     Without a command the answer is a released motion.
     """
     if answer.refusal is not None:
         return {"refusal": answer.refusal, "setting": answer.setting}
-    data: dict[str, Any] = {"answers": _write_arrays(answer.quantities)}
+    data: Message = {"answers": _write_arrays(answer.quantities)}
     if answer.at is not None and answer.at is not command:
         data["at"] = command_to_json(scene, answer.at)
     if answer.assembled is not None:
@@ -350,7 +349,7 @@ def answer_to_json(
     return {name: value for name, value in data.items() if value or name == "answers"}
 
 
-def _write_arrays(arrays: Mapping[str, Any]) -> dict[str, Any]:
+def _write_arrays(arrays: Mapping[str, Any]) -> Message:
     """Write numbers or pairs of them; null where there is no finite number."""
     written = {}
     for name, array in arrays.items():
@@ -406,7 +405,7 @@ def answer_from_json(
     )
 
 
-def _read_reply(data: Any) -> tuple[dict[str, Any], str, str]:
+def _read_reply(data: Any) -> tuple[Message, str, str]:
     """Return the object that an engine replied with, its setting and its refusal.
 
     Raises EngineError with its own words if it broke down.
@@ -434,7 +433,7 @@ def require_text(name: str, value: Any) -> str:
     return write_one_line(value)
 
 
-def _read_object(name: str, data: dict[str, Any]) -> dict[str, Any]:
+def _read_object(name: str, data: Message) -> Message:
     value = data.get(name)
     if value is None and name != "answers":
         return {}
@@ -444,7 +443,7 @@ def _read_object(name: str, data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_arrays(
-    table: str, data: dict[str, Any], n: int, vectors: Container[str] = VECTORS
+    table: str, data: Message, n: int, vectors: Container[str] = VECTORS
 ) -> dict[str, Array]:
     """Read n numbers under each name, or n pairs of them."""
     return {
@@ -554,7 +553,7 @@ def require_near(made: Command, command: Command) -> None:
             raise InputError(f"at.{key}", None, allowed)
 
 
-def read_setting(data: Any) -> dict[str, Any]:
+def read_setting(data: Any) -> Message:
     """Read the setting of a question, none if it is left out.
 
     Raises an InputError that names what is wrong.
@@ -578,7 +577,7 @@ def read_setting(data: Any) -> dict[str, Any]:
     return dict(data)
 
 
-def release_to_json(scene: Scene) -> dict[str, Any]:
+def release_to_json(scene: Scene) -> Message:
     """Write the start and the times of a released motion."""
     motion = scene.motion
     free = scene.motion.free

@@ -73,7 +73,7 @@ class Assembled(Protocol):
     def place(self, q: Sequence[float]) -> None:
         """Move to a configuration."""
 
-    def gap(self) -> tuple[float, float]:
+    def gap(self) -> Components:
         """Return B on bar 3 minus B on bar 4, or A on bar 2 minus A on bar 3, m."""
 
     def jacobian(self) -> Array:
@@ -105,7 +105,7 @@ class Loaded(Assembled, Protocol):
     """The drive, where it exerts a force."""
     driving: str
     """Name of the drive's quantity that is solved for."""
-    field: tuple[float, float] = (0.0, 0.0)
+    field: Components = (0.0, 0.0)
     """Field of gravity, m/s^2."""
     loaded: list[str]
     """Pins whose friction depends on their load."""
@@ -223,7 +223,7 @@ class Loaded(Assembled, Protocol):
         for sense, bar, point in ends:
             self.push(bar, sense * size * along, point)
 
-    def gravity(self, field: tuple[float, float]) -> None:
+    def gravity(self, field: Components) -> None:
         """Set a field (g_x, g_y) for the engine's own gravity, m/s^2."""
         self.field = field
 
@@ -359,7 +359,7 @@ class Tree(Loaded, Protocol):
 
     def needed(
         self,
-        field: tuple[float, float],
+        field: Components,
         wrenches: dict[int, list[float]],
     ) -> list[float]:
         """Return the three generalized forces of the motion last set, N m.
@@ -382,7 +382,7 @@ class Tree(Loaded, Protocol):
         return self.turned_to[bar]
 
     # methods that follow from these
-    def gap(self) -> tuple[float, float]:
+    def gap(self) -> Components:
         """Return B on bar 3 minus B on bar 4."""
         across = self.locate("end3") - self.locate("end4")
         return across.real, across.imag

@@ -73,6 +73,8 @@ PART, MASSES_APART = 0.3, 0.4
 """Part of a bar's mass that is split off, and the distance of both parts. The distance
 is in radii of gyration of the bar.
 """
+Numbers = dict[str, Array]
+"""Numbers, or errors, of quantities by their names, (n,) or (n, 2)."""
 _FORCES = (*PIN_FORCES, "torque", "drive_force")
 _TRANSFORMED_QUANTITIES = (
     *(f"{name}_{bar}" for name in ("theta", "omega", "alpha") for bar in MOVING_BARS),
@@ -139,7 +141,7 @@ class _Few:
         return self.solve(self.scene)
 
     @cached_property
-    def numbers(self) -> dict[str, Array]:
+    def numbers(self) -> Numbers:
         """Return the numbers of each quantity that the scene has."""
         found = {
             name: getattr(self.solution, name, None) for name in _TRANSFORMED_QUANTITIES
@@ -171,7 +173,7 @@ class _Few:
         self,
         *parts: tuple[int, Solution],
         read: Callable[[str, Solution], Array] = lambda name, other: other[name],
-    ) -> dict[str, Array]:
+    ) -> Numbers:
         """Compare the numbers here with a sum of multiples of those of other scenes.
 
         Errors (n,) are returned, in parts of the size of each quantity here, times the
@@ -301,7 +303,7 @@ def _measure_moved(
     sense: float = 1.0,
     turn: float = 0.0,
     size: float = 1.0,
-) -> dict[str, Array]:
+) -> Numbers:
     """Mirror a scene at the x-axis, turn it about O2, and multiply its lengths.
 
     What grows with lengths is multiplied too. Angles and couples of a sense have
@@ -342,7 +344,7 @@ def _turns_with_the_ground(scene: Scene, number: SceneNumber) -> bool:
     return not of_bar and not _IN_THE_WORLD.isdisjoint(number.place)
 
 
-def _measure_exchanged(few: _Few) -> dict[str, Array]:
+def _measure_exchanged(few: _Few) -> Numbers:
     """Read the linkage from O4.
 
     At its other end the ground points the other way, theta_1 + pi, and so does bar 3,
@@ -416,7 +418,7 @@ def _from_other_end(length: float, pair: Any) -> tuple[float, float]:
     return cmath.polar(length - cmath.rect(*pair))
 
 
-def _measure_superposed(few: _Few) -> dict[str, Array]:
+def _measure_superposed(few: _Few) -> Numbers:
     """Sum what each load and effect adds to the forces of inertia alone."""
     scene = few.scene
     bare = copy_with(scene, loads=(), effects=())
@@ -430,7 +432,7 @@ def _measure_superposed(few: _Few) -> dict[str, Array]:
     return few.compare(inertia, *((1, few.solve(part)) for part in alone))
 
 
-def _measure_split_masses(few: _Few) -> dict[str, Array]:
+def _measure_split_masses(few: _Few) -> Numbers:
     """Sum the forces of two bodies that make up each bar.
 
     All but gravity acts with one of them.
@@ -472,7 +474,7 @@ def _require_linear(scene: Scene) -> None:
 class _Transformation(NamedTuple):
     """A way of stating a scene otherwise."""
 
-    measure: Callable[[_Few], dict[str, Array]]
+    measure: Callable[[_Few], Numbers]
     """Errors of each quantity that is compared, times its condition, (n,)."""
     reason: str
     """Why nothing may change, as the report prints it."""

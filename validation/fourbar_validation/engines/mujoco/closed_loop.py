@@ -16,7 +16,7 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.mjcf.model import CYLINDER
 from fourbar.quantities import Array
-from fourbar_validation.engines.tree import BEARERS, Assembled, solve_closed
+from fourbar_validation.engines.tree import BEARERS, Assembled, Components, solve_closed
 
 # MuJoCo would write warnings to standard error and to a file of a fixed name in the
 # working folder; the monitor reads them from its data
@@ -113,7 +113,7 @@ class ClosedLoop(Assembled):
         self._carried = {bar: forces[body, 3:5] for body, bar in bar_of.items()}
         self._jac = np.zeros((3, model.nv))
 
-    def gap(self) -> tuple[float, float]:
+    def gap(self) -> Components:
         """Return B on bar 3 minus B on bar 4, m."""
         x, y = self.find_line("B4", "B3").tolist()
         return x, y
@@ -302,7 +302,6 @@ class ClosedLoop(Assembled):
         wanted: float,
         trials: tuple[float, float],
         correction: float = 0.0,
-        refinements: int = 0,
     ) -> float | None:
         """Solve for the couple or push that accelerates the crank (rad/s^2).
 
@@ -314,7 +313,7 @@ class ClosedLoop(Assembled):
             mujoco.mj_forward(self.model, self.data)
             return float(self.data.qacc[O2])
 
-        size = solve_couple(crank_acceleration, wanted, *trials, refinements)
+        size = solve_couple(crank_acceleration, wanted, *trials)
         mujoco.mj_rnePostConstraint(self.model, self.data)
         return size
 

@@ -22,7 +22,7 @@ from fourbar_validation.engines.description import (
 )
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree, has_term, list_wrenches
+from fourbar_validation.engines.tree import Components, Tree, has_term, list_wrenches
 
 
 def find_limit_met(parts: Iterable[MovingPart]) -> str:
@@ -125,7 +125,7 @@ class MujocoTree(Tree):
 
     def needed(
         self,
-        field: tuple[float, float],
+        field: Components,
         wrenches: dict[int, list[float]],
     ) -> list[float]:
         """Return the coordinates' forces by mj_inverse, less loads and effects."""
