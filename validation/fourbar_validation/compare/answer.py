@@ -11,6 +11,8 @@ from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import Array, Mask
 from fourbar.scene import Command, Scene
 
+Arrays = dict[str, Array]
+"""Numbers of quantities by their names: (n,), or (n, 2) of a vector."""
 RELEASED_QUANTITIES = ("theta_2", "omega_2", "energy", "terms")
 """Quantities of a released motion at stated times, (n,). The energy is kinetic and
 potential energy less the work that was done, J; `terms` are their magnitudes, summed.
@@ -32,7 +34,7 @@ class Answer:
     """Motion of this answer: the command itself, or that of a simulation."""
     assembled: Mask | None = None
     """Positions where the engine found by its own means that the loop closes, (n,)."""
-    quantities: dict[str, Array] = field(default_factory=dict)
+    quantities: Arrays = field(default_factory=dict)
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not
     answered. A released motion has those of `RELEASED_QUANTITIES`.
     """
@@ -40,7 +42,7 @@ class Answer:
     """Declared limit of the engine that this scene meets, with its reason. Nothing else
     is set then.
     """
-    predicted: dict[str, Array] = field(default_factory=dict)
+    predicted: Arrays = field(default_factory=dict)
     """Errors that the engine must expect by its own residuals, (n,), in the quantity's
     unit.
     """

@@ -21,7 +21,7 @@ from fourbar.linkage import MOVING_BARS, PINS, FourBar
 from fourbar.quantities import COUPLE, LINE, Array, ComplexArray
 from fourbar.scene import Command, Scene, find_signs, with_signs
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.answer import Answer, Arrays
 from fourbar_validation.compare.bodies import (
     BodyMotion,
     make_vector,
@@ -360,14 +360,18 @@ class FreeBody:
 
 def _list_dynamics(
     scene: Scene, command: Command, theta: Array
-) -> tuple[dict[str, Array], float]:
+) -> tuple[Arrays, float]:
     """List rates, pin forces and what the drive takes, and the largest residual.
 
     `theta`: angles of bars 2, 3 and 4, rad, (3, n).
     """
     motion = _move_bodies(scene.linkage, command, theta)
     forces, residual = _list_forces(scene, motion)
-    quantities = _list_rates(motion) | forces
+    quantities = motion.swing_points()
+    for bar in MOVING_BARS:
+        quantities[f"omega_{bar}"] = motion.omega[bar]
+        quantities[f"alpha_{bar}"] = motion.alpha[bar]
+    quantities |= forces
     if any(effect.dry for effect in scene.effects):
         begun = command._replace(speed=1.0, acceleration=0.0)
         omega = _move_bodies(scene.linkage, begun, theta).omega
@@ -382,7 +386,7 @@ def _move_bodies(linkage: FourBar, command: Command, theta: Array) -> BodyMotion
     )
 
 
-def _list_places(motion: BodyMotion, theta: Array) -> dict[str, Array]:
+def _list_places(motion: BodyMotion, theta: Array) -> Arrays:
     """List the angles, the sine of those of bars 3 and 4, and the points.
 
     The points are pins A, B and the mass centres.
@@ -393,16 +397,7 @@ def _list_places(motion: BodyMotion, theta: Array) -> dict[str, Array]:
     return quantities | motion.places()
 
 
-def _list_rates(motion: BodyMotion) -> dict[str, Array]:
-    """List speeds and accelerations of bars, and accelerations of the points."""
-    quantities = motion.swing_points()
-    for bar in MOVING_BARS:
-        quantities[f"omega_{bar}"] = motion.omega[bar]
-        quantities[f"alpha_{bar}"] = motion.alpha[bar]
-    return quantities
-
-
-def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[dict[str, Array], float]:
+def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[Arrays, float]:
     """List pin forces, the drive's size and its condition.
 
     The residual of the thirteen equations is returned too.
@@ -431,7 +426,7 @@ def _list_forces(scene: Scene, motion: BodyMotion) -> tuple[dict[str, Array], fl
 
 def _find_range_at_rest(
     scene: Scene, motion: BodyMotion, omega: dict[int, Array]
-) -> dict[str, Array]:
+) -> Arrays:
     """Find the least and the greatest that the drive takes where the linkage rests.
 
     `omega`: of a motion that may begin there, rad/s; its opposite may begin too.

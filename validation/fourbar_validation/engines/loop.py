@@ -20,12 +20,11 @@ from fourbar.quantities import (
     STAGE_OF,
     STAGES,
     VECTORS,
-    Array,
     Mask,
     Signs,
 )
 from fourbar.scene import Command, Scene, with_signs
-from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.answer import Answer, Arrays
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
     SHARED_BY_EXACT_ENGINES,
@@ -287,7 +286,7 @@ values by name, None where the loop does not close.
 
 def read_each(
     command: Command, names: Iterable[str], read: Read
-) -> tuple[dict[str, Array], Mask]:
+) -> tuple[Arrays, Mask]:
     """Read each position, NaN where there is no value; and where the loop closes."""
     out = make_blank(len(command.angle), names)
     closed = np.zeros(len(command.angle), dtype=bool)
@@ -309,7 +308,7 @@ MADE = ("theta_2", "omega_2", "alpha_2")
 def make_blank(
     n: int,
     names: Iterable[str],
-) -> dict[str, Array]:
+) -> Arrays:
     """Return NaN for each of n positions, (n,) or (n, 2)."""
     blank = {}
     for name in names:
@@ -319,9 +318,9 @@ def make_blank(
 
 
 def split_answer(
-    out: dict[str, Array],
+    out: Arrays,
     branch: Signs,
-) -> tuple[Command, dict[str, Array]]:
+) -> tuple[Command, Arrays]:
     """Split what was read into a command and the other quantities.
 
     The command is the motion that was made.
@@ -350,7 +349,7 @@ class PlainLoop:
         self.position = Assembler(tree)
         self.drive = tree.turns[scene.drive_bar]
 
-    def answer(self, command: Command) -> dict[str, Array]:
+    def answer(self, command: Command) -> Arrays:
         """Return the torque, (n,), and the pin forces, (n, 2)."""
         tree = self.tree
 

@@ -26,6 +26,7 @@ from fourbar_validation.engines.loop import Assembler, Exact
 from fourbar_validation.engines.tree import (
     Components,
     Tree,
+    Wrenches,
     has_term,
     list_wrenches,
     solve_closed,
@@ -120,7 +121,7 @@ class PinocchioTree(Tree):
     def needed(
         self,
         field: Components,
-        wrenches: dict[int, list[float]],
+        wrenches: Wrenches,
     ) -> list[float]:
         """Compute recursive Newton-Euler.
 

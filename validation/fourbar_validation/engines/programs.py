@@ -236,15 +236,6 @@ def keep_printed(outputs: dict[str, str], engine: str) -> Iterator[None]:
             outputs[engine] = outputs.get(engine, "") + text
 
 
-def _print_kept(data: bytes) -> None:
-    """Add what a program outside printed to what this process keeps.
-
-    Nothing is added if it keeps none.
-    """
-    if _file and data:
-        _file[0].write(data)
-
-
 def _take_printed() -> str:
     """Take what was printed since the last call, as plain text.
 
@@ -484,7 +475,8 @@ class Running:
         The text is kept too, as what this process prints.
         """
         text = b"" if self._errors is None else _take_written(self._errors)
-        _print_kept(text)
+        if _file and text:
+            _file[0].write(text)
         return text
 
     def _find_end(

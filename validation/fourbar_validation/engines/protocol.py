@@ -40,7 +40,12 @@ from fourbar.scene.motion import (
     Free,
     Motion,
 )
-from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer, EngineError
+from fourbar_validation.compare.answer import (
+    RELEASED_QUANTITIES,
+    Answer,
+    Arrays,
+    EngineError,
+)
 from fourbar_validation.compare.pins import find_mass, state_from_pins
 from fourbar_validation.compare.rows import write_one_line
 from fourbar_validation.compare.tolerance import OF_THE_COMMAND
@@ -444,7 +449,7 @@ def _read_object(name: str, data: Message) -> Message:
 
 def _read_arrays(
     table: str, data: Message, n: int, vectors: Container[str] = VECTORS
-) -> dict[str, Array]:
+) -> Arrays:
     """Read n numbers under each name, or n pairs of them."""
     return {
         name: _read_numbers(
@@ -456,7 +461,7 @@ def _read_arrays(
 
 def _read_assembled(
     value: Any,
-    quantities: dict[str, Array],
+    quantities: Arrays,
     command: Command,
 ) -> Any:
     """Read where the loop closes; left out: wherever there is a value.

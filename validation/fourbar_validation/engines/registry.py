@@ -19,7 +19,7 @@ from fourbar.linkage import record
 from fourbar.quantities import DRY_FRICTION_QUANTITIES, STAGE_OF, UNKNOWNS, Array
 from fourbar.scene import Command, LimitOrigin, Scene, StrokeOrigin, with_signs
 from fourbar.solution import Solution
-from fourbar_validation.compare.answer import Adapter, Answer
+from fourbar_validation.compare.answer import Adapter, Answer, Arrays
 from fourbar_validation.compare.compare import (
     COMPARED_QUANTITIES,
     AnswerNearby,
@@ -391,7 +391,7 @@ def make_answer_nearby(
         return None
 
     @cache
-    def answer() -> dict[str, Array]:
+    def answer() -> Arrays:
         from fourbar_validation.engines.balls import shift_to
 
         adapter = engine.start()

@@ -59,6 +59,10 @@ Components = tuple[float, float]
 """A vector of the plane as plain numbers, as an engine's calls take it. Everywhere else
 vectors are complex numbers, x + i y.
 """
+Wrenches = dict[int, list[float]]
+"""Sum of what acts on each moving bar as a force at its first pin and a couple, (x, y,
+moment), N and N m.
+"""
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
 BarValues = dict[str, Array | Sequence[float] | float]
@@ -111,10 +115,8 @@ class Loaded(Assembled, Protocol):
     """Pins whose friction depends on their load."""
     pin_loads: dict[str, float]
     """Magnitudes of pin forces on which friction depends, by pin, N."""
-    wrenches: dict[int, list[float]]
-    """Sum of what acts on each moving bar as a force at its first pin and a couple, (x,
-    y, moment), N and N m.
-    """
+    wrenches: Wrenches
+    """What acts on the moving bars."""
     terms: list[Act]
 
     def ready(self, scene: Scene, terms: list[Act]) -> None:
@@ -295,7 +297,7 @@ class Loaded(Assembled, Protocol):
         return forces
 
 
-def make_no_wrenches() -> dict[int, list[float]]:
+def make_no_wrenches() -> Wrenches:
     """Return the wrenches of bars on which nothing acts: zeros by the bar's number."""
     return {bar: [0.0, 0.0, 0.0] for bar in MOVING_BARS}
 
@@ -360,7 +362,7 @@ class Tree(Loaded, Protocol):
     def needed(
         self,
         field: Components,
-        wrenches: dict[int, list[float]],
+        wrenches: Wrenches,
     ) -> list[float]:
         """Return the three generalized forces of the motion last set, N m.
 

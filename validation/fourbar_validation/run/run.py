@@ -491,7 +491,13 @@ def _collect_tasks(
                 told = (FORMULAS, "", "all", FAILS, "nothing was judged")
                 record.rows = record.rows or [Row.unmeasured(name, *told)]
                 summary.add(record)
-                times.write(write_csv_rows((), _list_timings(record)))
+                for timing in record.timings:
+                    # the ratio is of answers to the same scene in the same process
+                    ratio = timing.seconds / record.timings[0].seconds
+                    who = (timing.scene, timing.engine, timing.setting)
+                    seconds = f"{timing.seconds:.6f}", f"{ratio:.1f}"
+                    cells = (*who, str(timing.positions), *seconds)
+                    times.write(write_csv_rows((), [cells]))
                 output.writelines(
                     f"{record.name}: {engine}\n{text}\n\n"
                     for engine, text in record.output.items()
@@ -511,14 +517,3 @@ def _redraw(plan: Plan, scene: int, record: Record) -> Job:
     broken = {row.engine for row in whole if row.failed}
     sound = [engine for engine in plan.engines if engine.name not in broken]
     return make_jobs(plan.suite, [scene], sound, draw=True)[0]
-
-
-def _list_timings(record: Record) -> Iterator[list[str]]:
-    """Yield the cells of each timing: seconds per answer and ratio to the formulas.
-
-    The ratio is of answers to the same scene in the same process.
-    """
-    for timing in record.timings:
-        ratio = timing.seconds / record.timings[0].seconds
-        numbers = (str(timing.positions), f"{timing.seconds:.6f}", f"{ratio:.1f}")
-        yield [timing.scene, timing.engine, timing.setting, *numbers]

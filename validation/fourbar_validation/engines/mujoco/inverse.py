@@ -22,7 +22,13 @@ from fourbar_validation.engines.description import (
 )
 from fourbar_validation.engines.limits import LIGHTEST
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Components, Tree, has_term, list_wrenches
+from fourbar_validation.engines.tree import (
+    Components,
+    Tree,
+    Wrenches,
+    has_term,
+    list_wrenches,
+)
 
 
 def find_limit_met(parts: Iterable[MovingPart]) -> str:
@@ -126,7 +132,7 @@ class MujocoTree(Tree):
     def needed(
         self,
         field: Components,
-        wrenches: dict[int, list[float]],
+        wrenches: Wrenches,
     ) -> list[float]:
         """Return the coordinates' forces by mj_inverse, less loads and effects."""
         self.model.opt.gravity[:2] = field

@@ -35,7 +35,7 @@ from fourbar.quantities import Array, Indices, Mask
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
 from fourbar.scene.motion import Motion
-from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer
+from fourbar_validation.compare.answer import RELEASED_QUANTITIES, Answer, Arrays
 from fourbar_validation.compare.pins import state_from_pins
 from fourbar_validation.engines.description import (
     find_from_middle,
@@ -284,7 +284,7 @@ class SimulatedRun:
         """Step on to the step nearest to a position."""
         self.stepper.to(self.motion_segment.seconds[index])
 
-    def read(self) -> tuple[float | None, dict[str, Array]]:
+    def read(self) -> tuple[float | None, Arrays]:
         """Read the drive and the pin forces of the state last forwarded.
 
         The drive is a torque (N m), or the force of a cylinder (N). The torque is None

@@ -25,10 +25,10 @@ import numpy as np
 
 from fourbar.errors import LimitError, write_count
 from fourbar.mjcf import Settings, write_mjcf
-from fourbar.quantities import PIN_FORCES, Array
+from fourbar.quantities import PIN_FORCES
 from fourbar.scene import Command, Scene, with_signs
 from fourbar.scene import command as command_of
-from fourbar_validation.compare.answer import Answer
+from fourbar_validation.compare.answer import Answer, Arrays
 from fourbar_validation.compare.compare import COMPARED_QUANTITIES, mark_turning
 from fourbar_validation.compare.tolerance import divide, magnitude
 from fourbar_validation.engines.description import name_driving
@@ -119,7 +119,7 @@ class Trial:
 
     at: Command
     """Motion that was really made."""
-    quantities: dict[str, Array] = field(default_factory=dict)
+    quantities: Arrays = field(default_factory=dict)
     """Torque (n,) and pin forces (n, 2), under the names of `fourbar.Solution`."""
     steps: int = 0
     steps_per_revolution: float = 0.0
