@@ -34,7 +34,7 @@ class Answer:
     """Motion of this answer: the command itself, or that of a simulation."""
     assembled: Mask | None = None
     """Positions where the engine found by its own means that the loop closes, (n,)."""
-    quantities: Arrays = field(default_factory=dict)
+    quantities: dict[str, Array] = field(default_factory=dict)
     """(n,) or (n, 2) arrays; NaN where not assembled. A name that is missing was not
     answered. A released motion has those of `RELEASED_QUANTITIES`.
     """
@@ -42,7 +42,7 @@ class Answer:
     """Declared limit of the engine that this scene meets, with its reason. Nothing else
     is set then.
     """
-    predicted: Arrays = field(default_factory=dict)
+    predicted: dict[str, Array] = field(default_factory=dict)
     """Errors that the engine must expect by its own residuals, (n,), in the quantity's
     unit.
     """
