@@ -15,17 +15,19 @@ import numpy as np
 from fourbar.effects import Friction, PinFriction
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import BAR_NAMES
-from fourbar.quantities import Array
+from fourbar.quantities import FORCE_NAMES, Array
 from fourbar.quantities.units import find_factor
 from fourbar.scene import Command, Scene
 from fourbar.solution import find_unit_of_quantity
 from fourbar.studies.keys import replace_numbers
-from fourbar_validation.check.calculated import join
+from fourbar_validation.check.calculated import free_edge, join
 from fourbar_validation.check.judge_table import Judge, JudgedColumn, compute_column
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.wrong_scenes import (
+    GRAVITY_ANGLE,
     Mistake,
     drop_remainder,
+    find_gravity,
     group_numbers,
     solve_other,
     state_all,
@@ -94,7 +96,7 @@ def _find_ratios(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistak
     """Yield columns that are ours times a number, vectors also in other axes."""
     by_text: dict[str, dict[str, Array]] = {}
     for column in differing:
-        for text, multiple in _list_multiples(column):
+        for text, multiple in (*_list_multiples(column), *_list_offsets(column)):
             if column.explained(column.measure(multiple), CARRIED):
                 if text:
                     by_text.setdefault(text, {})[column.quantity] = multiple
@@ -123,6 +125,23 @@ def _list_multiples(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
             for text, ratio in _list_ratios(column, abs(near), numbers):
                 multiple = _multiply(ratio * turn, right, mirrored)
                 yield ", ".join(filter(None, (axes, text))), multiple
+
+
+def _list_offsets(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
+    """List the constant by which a column may differ from ours, as of a sensor."""
+    if np.count_nonzero(column.where) < ENOUGH_NUMBERS:
+        return
+    right: Any = compute_column(column.judge.right, column.quantity)
+    apart = column.theirs - column.ours
+    if column.quantity.startswith("theta"):
+        apart = wrap_difference(apart)
+    allowed = (column.judged_right[1] * column.divisor)[column.where]
+    offset = np.average(apart[column.where], axis=0, weights=allowed**-2.0)
+    unit = column.unit
+    stated = np.atleast_1d(offset / unit.factor)
+    numbers = ", ".join(f"{x:+.5g}" for x in stated[np.isfinite(stated)])
+    text = f"every number is ours {numbers} {unit.text} {FITTED}"
+    yield text, right + np.nan_to_num(offset)
 
 
 def _multiply(ratio: complex, values: Array, mirrored: bool) -> Array:
@@ -213,6 +232,7 @@ class _Family(NamedTuple):
     """Problems that differ by a number, which is fitted."""
 
     start: float
+    """Number at which the fit begins: 1 of a factor, which has no plain name."""
     make: Callable[[float], Mistake]
     """Function of the number that returns the mistake of a problem."""
     of_ours: bool = True
@@ -237,14 +257,18 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     scene = state_all(judge.scene)
     at = drop_remainder(judge.at)
     jumps = any(isinstance(one, Friction | PinFriction) for one in scene.effects)
-    for family in (*_list_scenes(scene, at), *_list_commands(scene, at, columns)):
+    for family in (
+        *_list_scenes(scene, at),
+        *_list_commands(judge, scene, at, columns),
+    ):
         fitted = _fit(columns, family, right, rounding, jumps)
         for number in () if fitted is None else (float(round(fitted)), fitted):
             if abs(number) > LEAST_NUMBER:
-                mistake = family.make(number)
-                if mistake.text.endswith(FITTED) or not family.of_ours:
-                    mistake = mistake._replace(times=CARRIED)
-                yield mistake
+                mistake = family.make(number)._replace(times=CARRIED)
+                text = mistake.text
+                if family.start == 1.0 or number != round(number):
+                    text += f" {FITTED}"
+                yield mistake._replace(text=text)
                 left = _compute_residual(columns, mistake).ravel()
                 if np.all(np.abs(left) <= CARRIED * rounding):
                     break
@@ -324,23 +348,41 @@ def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
         fitted[f"lengths.{name}"] = {f"lengths.{name}": length}
     for name, group in fitted.items():
         yield _Family(1.0, partial(_scale, scene, at, name, group))
+    downwards = math.degrees(find_gravity(scene).angle) % 360.0
+    yield _Family(360.0 + downwards, partial(_point_gravity, scene, at))
 
 
 def _scale(
     scene: Scene, at: Command, name: str, group: dict[str, float], factor: float
 ) -> Mistake:
     numbers = {key: factor * value for key, value in group.items()}
-    text = f"{name} {factor:.6g} times ours {FITTED}"
+    text = f"{name} {factor:.6g} times ours"
     return solve_other(text, replace_numbers(scene, numbers), at)
 
 
+def _point_gravity(scene: Scene, at: Command, degrees: float) -> Mistake:
+    text = f"gravity points to {180.0 - (180.0 - degrees) % 360.0:.6g} deg"
+    other = replace_numbers(scene, {GRAVITY_ANGLE: math.radians(degrees)})
+    return solve_other(text, other, at)
+
+
 def _list_commands(
-    scene: Scene, at: Command, columns: list[JudgedColumn]
+    judge: Judge, scene: Scene, at: Command, columns: list[JudgedColumn]
 ) -> Iterator[_Family]:
     """List commands that may be others, as functions of a number."""
+    if judge.rows.later is not None:
+        yield _Family(0.0, partial(_delay, judge, scene, columns))
     for field, rate in zip(("speed", "acceleration"), at.names[1:], strict=True):
         if np.any(getattr(at, field)):
             yield _Family(1.0, partial(_hasten, scene, at, field, rate))
+    if at.speed is not None and not np.any(at.acceleration):
+
+        def accelerate(rate: float) -> Mistake:
+            unit = find_unit_of_quantity(at.names[2])
+            text = f"{at.names[2]} = {rate:.6g} {unit}, and not 0"
+            return solve_other(text, scene, at._replace(acceleration=rate))
+
+        yield _Family(0.0, accelerate)
     if at.moves_stroke:
         return
     n = len(at.angle)
@@ -368,6 +410,23 @@ def _list_commands(
         yield _Family(math.degrees(start), turn, of_ours=False)
 
 
+def _delay(
+    judge: Judge, scene: Scene, columns: list[JudgedColumn], late: float
+) -> Mistake:
+    """Return the problem of forces, or of all numbers, that are so many ms late."""
+    assert judge.rows.later is not None
+    at = drop_remainder(judge.rows.later(-late / 1e3))
+    mistake = solve_other("", scene, at)
+    of = "numbers"
+    if all(column.quantity in FORCE_NAMES for column in columns):
+        mistake, of = mistake.within(FORCE_NAMES), "forces"
+    when = ("late", "an earlier") if late > 0.0 else ("early", "a later")
+    text = f"{abs(late):.6g} ms {when[0]} ({of} of {when[1]} instant)"
+    first = 0 if late > 0.0 else len(at.angle) - 1
+    predict = partial(free_edge, judge, mistake, first)
+    return mistake._replace(text=text, predict=predict)
+
+
 def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
-    text = f"{rate} {factor:.6g} times ours {FITTED}"
+    text = f"{rate} {factor:.6g} times ours"
     return solve_other(text, scene, at._replace(**{field: factor * getattr(at, field)}))

@@ -429,7 +429,7 @@ class Judge:
         left_out = {
             heading: why
             for heading, why in table.left_out.items()
-            if not (rows.by_time and why == NOT_JUDGED["time"])
+            if not (rows.later and why == NOT_JUDGED["time"])
         }
         table = replace(table, columns=columns, left_out=left_out)
         if self.at.moves_stroke or table.found_by == "time":

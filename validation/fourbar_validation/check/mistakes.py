@@ -83,7 +83,7 @@ def list_hypotheses(scene: Scene, command: Command) -> Iterator[Mistake]:
     for text, other in list_wrong_scenes(stated):
         mistake = solve_other(text, other, at)
         yield mistake
-        if text.startswith(("loads", "effects")):
+        if text.startswith(("loads", "effects", "the torque")):
             for words, names in _WHERE.items():
                 yield mistake.within(names, words)
 
@@ -168,6 +168,9 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield clockwise.mirrored(-1.0)._replace(text=text)
     if at.speed is None:
         return
+    text = f"the motion is clockwise: {name}, {omega} and {alpha} are reversed"
+    reverse = {"speed": -at.speed, "acceleration": -at.acceleration}
+    yield change(text, angle=-at.angle, **reverse)
     for words, factor in _OF_SPEEDS.items():
         yield change(f"{omega} {words.format('s')}", speed=at.speed * factor)
     if np.any(at.acceleration):
@@ -258,7 +261,15 @@ def explain(
                 found.append(explanation)
     plain = [one for one in found if not one.text.endswith(FITTED)]
     most = max((len(one.quantities) for one in plain if one.whole), default=0)
-    found = [one for one in found if one in plain or len(one.quantities) > most]
+    named = set().union(*(one.quantities for one in plain))
+
+    def adds(one: Explanation) -> bool:
+        """Tell whether a fitted number explains what no plain name does."""
+        if one.whole:
+            return len(one.quantities) > most
+        return not named.issuperset(one.quantities)
+
+    found = [one for one in found if one in plain or adds(one)]
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
         found = [one for one in found if one.whole]

@@ -40,8 +40,9 @@ class RowCommands(NamedTuple):
     """Commands half a unit of a rounded angle, time or rate away, to either side."""
     rates: tuple[str, ...] = ()
     """Names of the speed and acceleration that the table states, and not the scene."""
-    by_time: bool = False
-    """True if the rates are those of a law at the times of the rows."""
+    later: Callable[[float], Command] | None = None
+    """Commands so many seconds later, where the times of the rows say which these are.
+    """
 
 
 def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
@@ -82,7 +83,7 @@ def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands
     # zeros at the ends of times may be left off
     filled = table.place._replace(rounding=table.place.filled)
     found = _command_rounded(replace(table, place=filled), command_at)
-    return found._replace(by_time=True)
+    return found._replace(later=command_at)
 
 
 def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
@@ -227,12 +228,15 @@ def _follow_law(
     def fits(time: Array) -> Mask:
         return np.abs(measure(time)) <= rounding
 
-    def command_at(time: Array) -> Command:
+    def follow(time: Array) -> Command:
         angle, speed, acceleration = law.at(time)
-        on_law = fits(time) | (rounding > _ONE_PLACE)
-        angle = np.where(on_law, angle, table.places)
         at = _command_each(base, angle)
         return at._replace(speed=speed, acceleration=acceleration)
+
+    def command_at(time: Array) -> Command:
+        at = follow(time)
+        on_law = fits(time) | (rounding > _ONE_PLACE)
+        return at._replace(angle=np.where(on_law, at.angle, table.places))
 
     fits_stated = np.abs(measure(stated)) <= rounding + _ONE_PLACE
     # zeros at the end of a time that fits may be left off; start and end are exact
@@ -269,9 +273,15 @@ def _follow_law(
     at = command_at(time)
     passed = np.maximum(np.abs(law.at(time)[1]) * half, rounding)
     if fits_stated.all() and np.prod(rounding / passed) < _BY_CHANCE:
-        return RowCommands(at, by_time=True)  # nobody rounded these times
-    near = tuple(command_at(_find_last_that_holds(fits, time, end)) for end in ends)
-    return RowCommands(at, near, by_time=True)
+        near = []  # nobody rounded these times
+    else:
+        within = (_find_last_that_holds(fits, time, end) for end in ends)
+        near = [*map(command_at, within)]
+
+    def later(shift: float) -> Command:
+        return follow(np.clip(time + shift, first, last))
+
+    return RowCommands(at, tuple(near), later=later)
 
 
 def _find_last_that_holds(

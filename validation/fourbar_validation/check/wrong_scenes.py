@@ -53,6 +53,12 @@ _INERTIAL = {
 """Factors on m a and I alpha of every bar, by the mistake behind them."""
 _GRAVITIES = (9.81, 9.80665, 9.8)
 """Gravity of textbooks and of simulators, m/s^2."""
+_DIRECTIONS = (-90.0, 0.0, 90.0, 180.0)
+"""Directions along an axis to which gravity may point, deg."""
+_DAMPING = ("viscous", "friction", "pin_friction")
+"""Effects that oppose motion, which many a simulator leaves out together."""
+GRAVITY_ANGLE = "effects.gravity.1"
+"""Key of the direction of gravity, which has hypotheses of its own."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
 
@@ -166,12 +172,15 @@ def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
         value = read_number(scene, entry)
         if not acts or not value or (entry.unit in _PLACE_UNITS) != places:
             continue
+        if key == GRAVITY_ANGLE:
+            continue
         parts = key.split(".")
         which = 2 if parts[0] == "effects" else 1
         shared = ".".join([*parts[:which], "*", *parts[which + 1 :]])
         names = [key]
         if not places:
             names += [".".join(parts[:end]) for end in range(len(parts) - 1, 0, -1)]
+            names += ["effects.*: damping and friction"] * (parts[1] in _DAMPING)
         if which < len(parts) - 1:
             names.append(shared)
         for name in names:
@@ -213,7 +222,7 @@ def _multiply_numbers(scene: Scene, places: bool) -> Iterator[tuple[str, Numbers
 
 def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
     """List other numbers of inertia and of gravity."""
-    gravity = _find_gravity(scene)
+    gravity = find_gravity(scene)
     for text, (by_mass, by_inertia) in _INERTIAL.items():
         numbers = {"effects.gravity.0": gravity.magnitude / by_mass}
         for name, bar in list_moving(scene):
@@ -223,11 +232,13 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
     if not gravity.magnitude:
         text = "gravity along -y is included though the scene has none"
         for size in _GRAVITIES:
-            along_y = {"effects.gravity.0": size, "effects.gravity.1": -math.pi / 2.0}
+            along_y = {"effects.gravity.0": size, GRAVITY_ANGLE: -math.pi / 2.0}
             yield f"{text}: {size} m/s^2", along_y
     with_ground = gravity.angle + scene.linkage.ground_angle
-    yield "gravity is taken along -y", {"effects.gravity.1": -math.pi / 2.0}
-    yield "gravity is turned with the ground", {"effects.gravity.1": with_ground}
+    yield "gravity is turned with the ground", {GRAVITY_ANGLE: with_ground}
+    for degrees in _DIRECTIONS:
+        angle = math.radians(degrees)
+        yield f"gravity points to {degrees:g} deg", {GRAVITY_ANGLE: angle}
 
 
 def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
@@ -238,6 +249,9 @@ def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
         r, phi = bar.mass_centre
         x, y = bar.length - r * math.cos(phi), r * math.sin(phi)
         steiner = bar.mass * r * r
+        from_other = {"centre.0": math.hypot(x, y), "centre.1": math.atan2(y, x)}
+        at_middle = {"centre.0": bar.length / 2.0, "centre.1": 0.0}
+        slender = bar.mass * bar.length**2 / 12.0
         wrong = {
             "inertia about the pin used as the inertia about G": {
                 "inertia": bar.moment_of_inertia + steiner
@@ -245,13 +259,15 @@ def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
             "inertia about G used as the inertia about the pin": {
                 "inertia": bar.moment_of_inertia - steiner
             },
-            "mass centre measured from the wrong pin": {
-                "centre.0": math.hypot(x, y),
-                "centre.1": math.atan2(y, x),
+            "mass centre measured from the wrong pin": from_other,
+            "mass centre measured from the wrong pin, its angle too": {
+                **from_other,
+                "centre.1": math.atan2(-y, x),
             },
-            "mass centre taken at mid-bar": {
-                "centre.0": bar.length / 2.0,
-                "centre.1": 0.0,
+            "mass centre taken at mid-bar": at_middle,
+            "mass centre taken at mid-bar, with m L^2/12": {
+                **at_middle,
+                "inertia": slender,
             },
         }
         for text, numbers in wrong.items():
@@ -261,7 +277,8 @@ def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
     yield from every.items()
 
 
-def _find_gravity(scene: Scene) -> Gravity:
+def find_gravity(scene: Scene) -> Gravity:
+    """Return the gravity of a scene that states every number."""
     (gravity,) = (one for one in scene.effects if isinstance(one, Gravity))
     return gravity
 
@@ -282,7 +299,7 @@ def _list_wrong_loads(scene: Scene) -> Iterator[tuple[str, tuple[Load, ...]]]:
         if len(others) > 1 or not text.startswith("loads.*"):
             numbered = enumerate(scene.loads)
             yield text, tuple(others.get(number, load) for number, load in numbered)
-    gravity = _find_gravity(scene)
+    gravity = find_gravity(scene)
     for name, bar in list_moving(scene):
         lift = Load(BAR_NUMBERS[name], (-gravity.magnitude * bar.mass, gravity.angle))
         yield f"the weight of bar {lift.bar} is missing", (*scene.loads, lift)
