@@ -103,6 +103,11 @@ CAUSES |= {
 }
 
 
+CAUSES["1 row alone: line 9"] = columns(
+    torque=answer()["torque"] * np.where(THETA[7] == THETA, 1.3, 1.0)
+)
+
+
 @mark.parametrize("cause", CAUSES)
 def test_the_cause_is_named_first_and_explains_all(cause, read):
     first = Judgement(DAMPED, read(write(CAUSES[cause]))).explanations[0]
@@ -128,3 +133,38 @@ def test_a_table_by_time_is_late_or_its_crank_has_another_zero(
     table = read(write(answer(turned=turned), names, time=THETA / 10.0))
     first = Judgement(DAMPED, table).explanations[0]
     assert first.text.endswith(said) and first.complete
+
+
+def test_another_speed_moves_every_row_of_a_table_by_time(read):
+    at = command(DAMPED)._replace(angle=1.04 * THETA, speed=10.4)
+    faster = FreeBody().answer(DAMPED, at).quantities
+    told = Judgement(DAMPED, read(write(faster, time=THETA / 10.0))).explanations
+    assert [one.text for one in told] == ["omega_2 1.04 times ours (fitted)"]
+
+
+def test_each_force_has_its_own_frame_and_sign(read):
+    """A simulator prints each joint's force in the frame of the joint's child."""
+    numbers = answer()
+    frames = {"F12": (2, ""), "F32": (3, ", with the other sign"), "F14": (4, "")}
+    for name, (bar, sign) in frames.items():
+        force = cis(-numbers[f"theta_{bar}"]) * (numbers[name] @ (1.0, 1.0j))
+        force *= -1.0 if sign else 1.0
+        numbers[name] = np.column_stack((force.real, force.imag))
+    table = read(write(numbers, ("torque", *frames)))
+    told = {one.quantities: one.text for one in Judgement(DAMPED, table).explanations}
+    for name, (bar, sign) in frames.items():
+        text = f"{name} is in the frame of bar {bar}, not in world axes{sign}"
+        assert told.pop((name,)) == text
+    assert not told
+
+
+@mark.parametrize(
+    "side, words", [(1.0, "counted to 180 deg"), (-1.0, ", on the other side")]
+)
+def test_transmission_angles_may_be_counted_to_180_deg(side, words, read):
+    numbers = answer()
+    angle = np.arccos(side * np.cos(numbers["theta_4"] - numbers["theta_3"]))
+    assert angle.max() > math.pi / 2.0 > angle.min()
+    table = read(write({"transmission": angle}, ["transmission"]))
+    first = Judgement(DAMPED, table).explanations[0]
+    assert first.text.endswith(words) and first.complete

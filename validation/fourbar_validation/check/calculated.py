@@ -15,7 +15,7 @@ import numpy as np
 from fourbar.effects import Flywheel
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import FORCE_NAMES, PIN_FORCES, Array, ComplexArray
-from fourbar_validation.check.judge_table import Judge, JudgedColumn
+from fourbar_validation.check.judge_table import Judge, JudgedColumn, compute_column
 from fourbar_validation.check.wrong_scenes import Mistake, drop_remainder, solve_other
 from fourbar_validation.compare.bodies import BodyMotion, pose, stack_components
 from fourbar_validation.compare.pins import find_inertia, find_mass, state_from_pins
@@ -90,6 +90,7 @@ def find_miscalculated(judge: Judge) -> Iterator[Mistake]:
         yield from _find_wrong_accelerations(judge)
     yield from _find_late(judge)
     yield from _find_other_branch(judge)
+    yield from _find_lone_row(judge)
 
 
 def _cut_loop(judge: Judge) -> Iterator[Mistake]:
@@ -128,14 +129,15 @@ def _turn_forces(judge: Judge) -> Iterator[Mistake]:
         }
         for words, side in (("on which it acts", 1), ("that exerts it", 0))
     }
+    ground = judge.scene.linkage.ground_angle
     of_every = {"forces are": FORCE_BETWEEN.keys()}
     of_one = {f"{name} is": [name] for name in FORCE_BETWEEN}
     for words, names in {**of_every, **of_one}.items():
-        for bar in (1, *MOVING_BARS):
+        for bar in (1, *MOVING_BARS)[not ground :]:
             frames[f"{words} in the frame of bar {bar}"] = dict.fromkeys(names, bar)
     right = judge.right
     theta: dict[int, Any] = {bar: right[f"theta_{bar}"] for bar in MOVING_BARS}
-    theta[1] = judge.scene.linkage.ground_angle
+    theta[1] = ground
     for text, bars in frames.items():
         turned = {
             name: stack_components(join(right[name]) * np.exp(-1j * theta[bar]))
@@ -143,6 +145,10 @@ def _turn_forces(judge: Judge) -> Iterator[Mistake]:
         }
         whole = len(turned) > 1
         yield Mistake(f"{text}, not in world axes", turned.get, whole=whole)
+        if not whole:
+            opposite = {name: -force for name, force in turned.items()}
+            signed = f"{text}, not in world axes, with the other sign"
+            yield Mistake(signed, opposite.get, whole=False)
 
 
 def _find_equal_forces(judge: Judge) -> Iterator[Mistake]:
@@ -294,6 +300,20 @@ def take_theirs(
     values, rows = values.copy(), find_rows(column)
     values[rows] = np.where(np.isnan(theirs), values, theirs)[rows]
     return values
+
+
+def _find_lone_row(judge: Judge) -> Iterator[Mistake]:
+    """Yield the one row that is wrong, where no other is."""
+    wrong = [column.wrong for column in judge.columns.values()]
+    rows = np.flatnonzero(np.any(wrong, axis=0))
+    if len(rows) == 1 and len(judge.right) > ENOUGH_POSITIONS:
+
+        def predict(quantity: str) -> Array | None:
+            right = compute_column(judge.right, quantity)
+            return take_theirs(judge, right, quantity, lambda _: rows)
+
+        text = f"1 row alone: line {judge.table.lines[rows[0]]}"
+        yield Mistake(text, predict, whole=False)
 
 
 def _find_other_branch(judge: Judge) -> Iterator[Mistake]:

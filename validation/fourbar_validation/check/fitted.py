@@ -374,7 +374,7 @@ def _list_commands(
         yield _Family(0.0, partial(_delay, judge, scene, columns))
     for field, rate in zip(("speed", "acceleration"), at.names[1:], strict=True):
         if np.any(getattr(at, field)):
-            yield _Family(1.0, partial(_hasten, scene, at, field, rate))
+            yield _Family(1.0, partial(_hasten, judge, scene, at, field, rate))
     if at.speed is not None and not np.any(at.acceleration):
 
         def accelerate(rate: float) -> Mistake:
@@ -427,6 +427,11 @@ def _delay(
     return mistake._replace(text=text, predict=predict)
 
 
-def _hasten(scene: Scene, at: Command, field: str, rate: str, factor: float) -> Mistake:
+def _hasten(
+    judge: Judge, scene: Scene, at: Command, field: str, rate: str, factor: float
+) -> Mistake:
+    later, table = judge.rows.later, judge.stated
+    if later and table.found_by == "time" and scene.motion.law is None:
+        at = drop_remainder(later((factor - 1.0) * table.places))
     text = f"{rate} {factor:.6g} times ours"
     return solve_other(text, scene, at._replace(**{field: factor * getattr(at, field)}))

@@ -33,6 +33,7 @@ from fourbar_validation.check.wrong_scenes import (
     solve_other,
     state_all,
 )
+from fourbar_validation.compare.tolerance import wrap_difference
 
 _RPM = np.pi / 30.0
 """rad/s of one rev/min."""
@@ -64,6 +65,10 @@ def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
     for text, (change, kinds) in _COLUMN_MISTAKES.items():
         predict = partial(_change_column, right, change, kinds)
         yield Mistake(text, predict, whole=False)
+    to_180 = np.abs(wrap_difference(right.theta_4 - right.theta_3))
+    for text, angle in {"": to_180, ", on the other side": np.pi - to_180}.items():
+        counted = {"transmission": angle}
+        yield Mistake(f"counted to 180 deg{text}", counted.get, whole=False)
     rates = _ANGULAR[:1] if right.at.speed is None else _ANGULAR
     for bar in (2, 3):
         turning = {

@@ -40,7 +40,7 @@ class RowCommands(NamedTuple):
     """Commands half a unit of a rounded angle, time or rate away, to either side."""
     rates: tuple[str, ...] = ()
     """Names of the speed and acceleration that the table states, and not the scene."""
-    later: Callable[[float], Command] | None = None
+    later: Callable[[Array | float], Command] | None = None
     """Commands so many seconds later, where the times of the rows say which these are.
     """
 
@@ -278,7 +278,7 @@ def _follow_law(
         within = (_find_last_that_holds(fits, time, end) for end in ends)
         near = [*map(command_at, within)]
 
-    def later(shift: float) -> Command:
+    def later(shift: Array | float) -> Command:
         return follow(np.clip(time + shift, first, last))
 
     return RowCommands(at, tuple(near), later=later)
