@@ -63,12 +63,9 @@ def state_messages_in(units: Mapping[str, tuple[str, float]]) -> Iterator[None]:
         _MESSAGE_UNITS.reset(token)
 
 
-def name_unit(unit: str, otherwise: str | None = None) -> str:
-    """Return the unit of messages for an SI unit.
-
-    `otherwise`: the unit where messages have none for it; left out: the SI unit.
-    """
-    return _MESSAGE_UNITS.get({}).get(unit, (otherwise or unit, 1.0))[0]
+def name_unit(unit: str) -> str:
+    """Return the unit of messages for an SI unit."""
+    return _MESSAGE_UNITS.get({}).get(unit, (unit, 1.0))[0]
 
 
 def write_in_units(
@@ -182,9 +179,8 @@ class InputError(FourBarError):
         self.unit = unit
         # a reader wants 0.21, not np.float64(0.21); an interruption while numpy is
         # imported is one line too, so that this module does not import it
-        numpy = sys.modules.get("numpy")
-        if numpy is not None and isinstance(value, numpy.generic):
-            value = value.item()
+        if type(value).__module__ == "numpy" and not getattr(value, "shape", True):
+            value = value.item()  # type: ignore[attr-defined]
         try:
             shown = " ".join(repr(value).split())  # arrays take several lines
         except ValueError:

@@ -205,9 +205,16 @@ class Declared(NamedTuple):
 
     def check(self, key: str, value: Any) -> Any:
         """Return the number or pair as floats, in its unit; InputError for others."""
-        if self.pair:
-            return require_pair(key, value, self)
-        return require(key, value, self.unit, self.bound)
+        if not self.pair:
+            return require(key, value, self.unit, self.bound)
+        try:
+            pair: Any = None if isinstance(value, str | dict) else value
+            size, other = pair
+        except (TypeError, ValueError):
+            form = f"must be a pair like [{_show(*self.units)}]"
+            raise InputError(key, value, form) from None
+        numbers = zip((size, other), self.units, self.bounds, strict=True)
+        return tuple(require(key, *number) for number in numbers)
 
 
 class OneOf(NamedTuple):
@@ -393,22 +400,6 @@ class Described:
             object.__setattr__(self, one.name, checked)
 
 
-def require_pair(key: str, value: Any, by: Declared) -> tuple[float, float]:
-    """Return a pair of numbers, mostly a size and an angle, as floats.
-
-    Raises an InputError that says what is allowed.
-    """
-    try:
-        pair: Any = None if isinstance(value, str | dict) else value
-        size, other = pair
-    except (TypeError, ValueError):
-        form = f"must be a pair like [{_show(*by.units)}]"
-        raise InputError(key, value, form) from None
-    unit, second = by.units
-    bound, of_second = by.bounds
-    return require(key, size, unit, bound), require(key, other, second, of_second)
-
-
 def copy_with(description: Description, /, **changed: Any) -> Description:
     """Return a frozen description with some fields changed, itself where none is.
 
@@ -474,46 +465,28 @@ class Bar(Described):
 
     def __post_init__(self) -> None:
         Described.__post_init__(self)
-        if self.section is not None and self.diameter is not None:
-            raise InputError(
-                "diameter",
-                self.diameter,
-                "must be left out beside a section",
-                unit="m",
-            )
+        size = "diameter" if self.section is None else "section"
         modulus = self.section_modulus
-        if modulus is not None and not 0.0 < modulus < math.inf:
-            name = "diameter" if self.section is None else "section"
-            raise InputError(
-                name,
-                getattr(self, name),
-                "is no size of a bar: the cube of it must be a positive double",
-                unit="m",
+        allowed = {}
+        if self.section is not None and self.diameter is not None:
+            allowed["diameter"] = "must be left out beside a section"
+        elif modulus is not None and not 0.0 < modulus < math.inf:
+            allowed[size] = (
+                "is no size of a bar: the cube of it must be a positive double"
             )
-        if self.density is not None and self.area is None:
-            raise InputError(
-                "density",
-                self.density,
-                "needs the cross-section: section or diameter",
-                unit="kg/m^3",
-            )
-        if self.density is not None and self.mass_per_length is not None:
-            raise InputError(
-                "density",
-                self.density,
-                "must be left out beside mass_per_length",
-                unit="kg/m^3",
-            )
-        stated = self.mass
-        object.__setattr__(self, "mass", self.weigh())
-        if stated not in (0.0, self.mass):
-            raise InputError(
-                "mass",
-                stated,
+        elif self.density is not None and self.area is None:
+            allowed["density"] = "needs the cross-section: section or diameter"
+        elif self.density is not None and self.mass_per_length is not None:
+            allowed["density"] = "must be left out beside mass_per_length"
+        elif self.mass not in (0.0, self.weigh()):
+            allowed["mass"] = (
                 "must be left out (0 in dataclasses.replace): density or"
-                " mass_per_length states it, unless it is None",
-                unit="kg",
+                " mass_per_length states it, unless it is None"
             )
+        for name, reason in allowed.items():
+            unit = Bar.numbers[name].unit
+            raise InputError(name, getattr(self, name), reason, unit=unit)
+        object.__setattr__(self, "mass", self.weigh())
 
     @property
     def area(self) -> Any:

@@ -20,8 +20,8 @@ from fourbar.quantities import (
     LINE,
     LINE_QUANTITIES,
     NOT_ASSEMBLED,
+    OF_POINTS,
     PIN_FORCES,
-    SCALARS,
     STATUS_NAMES,
     STROKE,
     UNITS,
@@ -30,10 +30,9 @@ from fourbar.quantities import (
     Mask,
     Quantities,
     Signs,
-    find_derived,
+    find_quantity,
 )
-from fourbar.scene import Command, Scene, command
-from fourbar.scene.scene import load_show
+from fourbar.scene import Command, Scene, command, load_show
 from fourbar.writing import (
     describe_extent,
     list_names,
@@ -149,11 +148,13 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
         """Return whether all fields are equal, number by number and NaN to NaN."""
         if not isinstance(other, Solution):
             return NotImplemented
-        return all(
-            _is_equal(getattr(self, part.name), getattr(other, part.name))
-            for part in fields(self)
-            if part.name not in ("stated", "command_at")
-        )
+        names = {part.name for part in fields(self)} - {"stated", "command_at"}
+        try:
+            for name in names:
+                np.testing.assert_equal(getattr(self, name), getattr(other, name))
+        except AssertionError:
+            return False
+        return True
 
     def __repr__(self) -> str:
         """Say in three lines what it holds."""
@@ -263,32 +264,15 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Raises DependencyError where pandas is not installed.
         """
-        columns = _list_leading(self)
-        units_of = {}
-        for heading, (unit, values) in _list_scalars(
-            self, require_units(units)
-        ).items():
-            if values is not None:
-                columns[heading] = values
-                units_of[heading] = unit
-        table = make_data_frame(columns)
-        table.attrs["units"] = units_of
+        evaluated = {
+            heading: column
+            for heading, column in _list_scalars(self, require_units(units)).items()
+            if column[1] is not None
+        }
+        columns = {heading: values for heading, (_, values) in evaluated.items()}
+        table = make_data_frame(_list_leading(self) | columns)
+        table.attrs["units"] = {name: unit for name, (unit, _) in evaluated.items()}
         return table
-
-
-def _is_equal(one: Any, another: Any) -> bool:
-    """Return whether two parts of a solution are equal, arrays in them too."""
-    if isinstance(one, np.ndarray) or isinstance(another, np.ndarray):
-        has_nan = np.issubdtype(np.asarray(one).dtype, np.floating)
-        return np.array_equal(one, another, equal_nan=has_nan)
-    if isinstance(one, dict) and isinstance(another, dict):
-        if one.keys() != another.keys():
-            return False
-        another = tuple(another[name] for name in one)
-        one = tuple(one.values())
-    if isinstance(one, tuple) and isinstance(another, tuple):
-        return len(one) == len(another) and all(map(_is_equal, one, another))
-    return bool(one == another)
 
 
 def where_assembled(solution: Solution, values: Any) -> Array:
@@ -426,10 +410,7 @@ def _list_scalars(
 
 def is_scalar(name: str) -> bool:
     """Return True if a quantity is one number at a position."""
-    derived = find_derived(name)
-    if derived is not None:
-        return derived.kind == "scalar"
-    return name in SCALARS
+    return find_quantity(name).kind == "scalar"
 
 
 def has_size(name: str) -> bool:
@@ -437,7 +418,7 @@ def has_size(name: str) -> bool:
 
     Forces have it.
     """
-    return name in PIN_FORCES or name == "shaking_force"
+    return find_quantity(name)[1:3] == ("vector", "N")
 
 
 def compute_times(scene: Scene | None, at: Command) -> Array | None:
@@ -495,13 +476,9 @@ def _list_quantities(solution: Solution) -> dict[str, Array | None]:
         left_out = (*left_out, "time")
     names = [name for name in UNITS if name not in left_out]
     quantities = {name: getattr(solution, name) for name in names}
-    of_points = {
-        "": solution.points,
-        "v_": solution.velocity,
-        "a_": solution.acceleration,
-    }
-    for name in dict.fromkeys(chain(*of_points.values())):
-        for start, arrays in of_points.items():
+    of_points = solution.points, solution.velocity, solution.acceleration
+    for name in dict.fromkeys(chain(*of_points)):
+        for start, arrays in zip(OF_POINTS, of_points, strict=True):
             quantities[start + name] = arrays.get(name)
     return quantities
 
@@ -511,11 +488,7 @@ def find_unit_of_quantity(name: str) -> str:
 
     Names of a point stand for its place, its velocity or its acceleration.
     """
-    derived = find_derived(name)
-    if derived is not None:
-        return derived.unit
-    of_point = {"v_": "m/s", "a_": "m/s^2"}.get(name[:2], "m")
-    return UNITS.get(name) or of_point
+    return find_quantity(name).unit
 
 
 def find_values(solution: Solution, name: str, units: Conversion = SI) -> Any:

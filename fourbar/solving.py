@@ -4,7 +4,7 @@ The evaluation ends after the stage that is asked for.
 """
 
 import cmath
-from collections.abc import Iterator, KeysView, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, Protocol
 
@@ -27,12 +27,14 @@ from fourbar.quantities import (
     COUPLE,
     DRY_FRICTION_QUANTITIES,
     LINE_QUANTITIES,
+    OF_POINTS,
     PIN_LOAD_QUANTITIES,
     SCALARS,
     STAGE_OF,
     STAGES,
     STROKE,
     Array,
+    find_quantity,
 )
 from fourbar.scene import (
     Command,
@@ -44,7 +46,6 @@ from fourbar.scene import (
     find_signs,
 )
 from fourbar.scene.motion import COMMAND_NAMES
-from fourbar.scene.numbers import POINT_STAGES
 from fourbar.solution import Solution, unwrap
 
 _LONG_BLOCK = POSITIONS_OF_A_BLOCK // 4
@@ -106,7 +107,7 @@ def solve(
             allowed = "a study states its own positions: vary the commanded angle"
             raise InputError("at", "a command", allowed)
         return scene.solve(stage, out=out, side=side)
-    of_release: dict[str, Any] = {}
+    of_release = dict[str, Any]()
     if at is not None:
         _require_command_at(at)
     elif scene.motion.free is not None:
@@ -114,9 +115,8 @@ def solve(
 
         released = release(scene)
         at = released.command
-        of_release["change_points"] = released.change_points
-        of_release["with_extremes"] = released.with_extremes
-        of_release["command_at"] = released.command_at
+        for name in ("change_points", "with_extremes", "command_at"):
+            of_release[name] = getattr(released, name)
     else:
         at = command(scene)
     results = Results(scene, at, stage, out)
@@ -156,22 +156,19 @@ class Results:
         self.shape = at.angle.shape
         self.out = {} if out is None else out
         points = tuple(point.name for point in scene.points)
-        wanted: KeysView[str]
+        stages = _list_stages(points, _list_foreign(scene))
         if out is None:
             if stage is None:
                 stage = "position" if at.speed is None else "force"
             if not isinstance(stage, str) or stage not in STAGES:
                 raise InputError("stage", stage, "must be one of " + ", ".join(STAGES))
             self.last_stage = STAGES.index(stage)
-            wanted = _list_evaluated(self.last_stage, _list_absent(scene), points)
+            reached = {name for name in stages if stages[name] <= self.last_stage}
+            self.wanted = reached.difference(_list_absent(scene))
         else:
-            foreign = _list_foreign(scene)
-            stages = _list_stages(points)
-            allowed = [name for name in stages if name not in foreign]
-            _require_out(out, self.shape, allowed)
-            wanted = out.keys()
-            needed = {STAGES.index(stages[name]) for name in out}
-            self.last_stage = max(needed, default=0)
+            _require_out(out, self.shape, stages)
+            self.wanted = {*out}
+            self.last_stage = max((stages[name] for name in out), default=0)
         if self.last_stage > 0 and at.speed is None:
             raise InputError(
                 f"motion.omega_{at.bar}",
@@ -179,8 +176,7 @@ class Results:
                 f"is needed for the stage {STAGES[self.last_stage]!r}",
             )
         if at.bar != 2:
-            wanted = {**dict.fromkeys(wanted), "theta_2": None, "sin_mu": None}.keys()
-        self.wanted = wanted
+            self.wanted |= {"theta_2", "sin_mu"}
         self.codes = np.zeros(0, dtype=np.uint8)
         self.arrays: dict[str, Array] = {}
 
@@ -253,18 +249,12 @@ class Results:
         """Evaluate a released motion, as the commands that it is made of."""
         self.allocate()
         for index, at, side in released.commands():
-            case = Case.of_released(scene, at.bar, side)
-            evaluated = evaluate_released(
-                case,
-                at,
-                scene.drive,
-                self.last_stage,
-                self.wanted,
-            )
+            case = Case.of(scene, at.bar, side)
+            evaluated = evaluate_released(case, at, self.last_stage, self.wanted)
             self._store(case, evaluated, (index,))
 
 
-def _require_out(out: Any, shape: tuple[int, ...], allowed: list[str]) -> None:
+def _require_out(out: Any, shape: tuple[int, ...], allowed: Iterable[str]) -> None:
     """Raise InputError for arrays that quantities cannot be written into."""
     expect("out", out, Mapping)
     for name, array in out.items():
@@ -326,26 +316,15 @@ def find_last_stage(scene: Scene) -> str:
     return STAGES[-1]
 
 
-def _list_stages(points: tuple[str, ...]) -> dict[str, str]:
-    """List every quantity of a scene, those of its own points too, and its stage."""
-    return STAGE_OF | {
-        start + name: stage for name in points for start, stage in POINT_STAGES.items()
-    }
-
-
 @cache
-def _list_evaluated(
-    last_stage: int,
-    absent: tuple[str, ...],
-    points: tuple[str, ...],
-) -> KeysView[str]:
-    """List the quantities of the stages up to the last one evaluated."""
-    before = STAGES[: last_stage + 1]
+def _list_stages(points: tuple[str, ...], foreign: tuple[str, ...]) -> dict[str, int]:
+    """List the quantities of a scene, those of its points too, with their stages."""
+    names = [*STAGE_OF]
+    for name in points:
+        names += [start + name for start in OF_POINTS]
     return {
-        name: stage
-        for name, stage in _list_stages(points).items()
-        if stage in before and name not in absent
-    }.keys()
+        name: find_quantity(name).stage_number for name in names if name not in foreign
+    }
 
 
 def make_solution(
@@ -373,7 +352,7 @@ def make_solution(
         theta_2 = turn_first(theta_2)
         if commanded in quantities:
             quantities[commanded][...] = theta_2 + 0.0 * quantities[commanded]
-    of_points: dict[str, dict[str, Array]] = {start: {} for start in POINT_STAGES}
+    of_points: dict[str, dict[str, Array]] = {start: {} for start in OF_POINTS}
     for point in scene.points:
         for start, arrays in of_points.items():
             if start + point.name in quantities:
@@ -417,14 +396,10 @@ def _list_foreign(scene: Scene) -> tuple[str, ...]:
 
 
 def _list_absent(scene: Scene) -> tuple[str, ...]:
-    """List the quantities that a solution of the scene lacks.
-
-    Quantities of other drives are always absent, those of dry friction and of pin loads
-    if no effect has dry friction or depends on the loads.
-    """
-    absent = _list_foreign(scene)
+    """List the quantities of dry friction and of pin loads that no effect needs."""
+    absent: tuple[str, ...] = ()
     if not any(effect.dry for effect in scene.effects):
-        absent = (*absent, *DRY_FRICTION_QUANTITIES)
+        absent = DRY_FRICTION_QUANTITIES
     if any(effect.loaded_pins for effect in scene.effects):
         return absent
     return (*absent, *PIN_LOAD_QUANTITIES)

@@ -95,11 +95,8 @@ def read_text(path: str | Path, key: str, largest: int, *, pipes: bool = False) 
     try:
         return read_bytes(path, key, largest, pipes=pipes).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            key,
-            str(path),
-            f"must be UTF-8 text; byte {error.start} is not",
-        ) from None
+        allowed = f"must be UTF-8 text; byte {error.start} is not"
+        raise InputError(key, str(path), allowed) from None
 
 
 @contextmanager
@@ -131,15 +128,11 @@ def require_file(target: Path, *read: Path) -> None:
     if target.is_dir() or "\0" in str(target):
         raise InputError("path", str(target), "must name a file, not a folder")
     if not target.parent.is_dir():
-        raise InputError(
-            "path",
-            str(target),
-            f"there is no such folder: {target.parent}",
-        )
-    if any(
-        target.exists() and file.exists() and target.samefile(file) for file in read
-    ):
-        raise InputError("path", str(target), "is read here, and would be lost")
+        allowed = f"there is no such folder: {target.parent}"
+        raise InputError("path", str(target), allowed)
+    for file in read:
+        if target.exists() and file.exists() and target.samefile(file):
+            raise InputError("path", str(target), "is read here, and would be lost")
 
 
 def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None:
@@ -169,11 +162,8 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
     import tempfile
 
     with name_file(target):
-        handle, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:100]}.",
-            suffix=_TEMPORARY,
-            dir=target.parent,
-        )
+        prefix = f".{target.name[:100]}."
+        handle, temporary = tempfile.mkstemp(_TEMPORARY, prefix, target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
@@ -223,9 +213,8 @@ def write_between(values: Any) -> str:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "no value"
-    if finite.min() == finite.max():
-        return f"{finite.min():.6g}"
-    return f"{finite.min():.6g} to {finite.max():.6g}"
+    ends = dict.fromkeys((finite.min(), finite.max()))
+    return " to ".join(f"{end:.6g}" for end in ends)
 
 
 def list_names(what: str, names: Iterable[str]) -> str:

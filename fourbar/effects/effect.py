@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import fields
-from functools import cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -16,6 +15,7 @@ from fourbar.formulas.pin_forces import Body, MovingBodies, PinForces, Wrenches
 from fourbar.linkage import PINS, Declared, FourBar
 from fourbar.quantities import Array, Codes, Signs
 
+_PIN_OF_BARS = {frozenset(bars): pin for pin, bars in PINS.items()}
 Joints = tuple[float, float, float]
 """Angles of pins O2, A, O4, rad."""
 LARGEST_SLIP_AT_REST = 50.0 * 2.0**-52
@@ -158,7 +158,7 @@ class Actions:
         couple, by the arm of the point that is nearer to the pin; between moving bars
         it is in no sum of another bar.
         """
-        pin = _find_common_pin(start.bar, end.bar)
+        pin = _PIN_OF_BARS.get(frozenset((start.bar, end.bar)))
         if pin is None:
             self.pull_ends(start, end, force)
             return
@@ -289,14 +289,6 @@ class Actions:
         A = self.through.get("A", 0.0)
         B = self.through.get("B", 0.0)
         return pins._replace(F32=pins.F32 + A, F43=pins.F43 + B)
-
-
-@cache
-def _find_common_pin(first: int, second: int) -> str | None:
-    for pin, bars in PINS.items():
-        if {first, second} == {*bars}:
-            return pin
-    return None
 
 
 class SolvedFriction(NamedTuple):

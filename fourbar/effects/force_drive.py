@@ -23,10 +23,10 @@ from fourbar.effects.place import COINCIDENT_POINTS, At, Line, Place, Placed
 from fourbar.errors import InputError, write_in_units
 from fourbar.formulas.arithmetic import Number, is_any, polar
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import NO_DIGIT_LEFT
+from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
 from fourbar.formulas.pin_forces import Body
 from fourbar.linkage import ENDS, MOVING_BARS, PINS, Declared, FourBar, OneOf, record
-from fourbar.quantities import NO_DIRECTION, NO_LEVER, OK
+from fourbar.quantities import LINE, NO_DIRECTION, NO_LEVER, OK
 
 MASSLESS = (Body(0.0, 0.0, 0.0j),) * 3
 
@@ -36,6 +36,7 @@ class ForceDrive(Placed, ABC):
 
     __slots__ = ()
     stated_at = "drive"
+    names = LINE
     has_stroke = False
     """True if the drive is between two points, whose distance is its stroke."""
 
@@ -84,7 +85,7 @@ class ForceDrive(Placed, ABC):
         """Return the path from one end to the other, m; 1 for a drive at one place."""
         return 1.0
 
-    def status(self, state: State, sines: dict[int, Number]) -> Number:
+    def status(self, state: State, path: LoopPath) -> Number:
         """Return NO_DIRECTION where the ends coincide, NO_LEVER where P vanishes.
 
         P vanishes within its rounding. None: there is no such position. Places are
@@ -93,7 +94,7 @@ class ForceDrive(Placed, ABC):
         """
         stroke, _ = self.line(state)
         distance = 1.0 if stroke is None else stroke
-        lever, most = self.leverage(state, sines)
+        lever, most = self.leverage(state, path)
         away = self.reach(state)
         without_lever = abs(lever) * distance <= NO_DIGIT_LEFT * most * away
         coincide = distance <= COINCIDENT_POINTS * away
@@ -108,19 +109,16 @@ class ForceDrive(Placed, ABC):
         self.act(single, 1.0)
         return single.generalized_forces()[0]
 
-    def leverage(self, state: State, sines: dict[int, Number]) -> tuple[Number, Number]:
+    def leverage(self, state: State, path: LoopPath) -> tuple[Number, Number]:
         """Compute P and L, the largest value that P could have.
 
         L is the sum of what each end could move, m: r on bar 2, a + r a/b on bar 3, r
         a/c on bar 4, with r the end's distance from the bar's first pin.
-
-        `sines`: of theta_4 - theta_3, theta_4 - theta_2, theta_3 - theta_2, as of a
-        drive on bar 2, 3, 4.
         """
         _, a, b, c, _, _ = state.lengths
-        h2 = sines[2]
-        h3 = (-a / b) * sines[3]
-        h4 = (-a / c) * sines[4]
+        h2, s3, s4 = (path.drive_sine(state.position, bar) for bar in MOVING_BARS)
+        h3 = (-a / b) * s3
+        h4 = (-a / c) * s4
         k = state.k._replace(h2=h2, h3=h3, h4=h4, h23=h2 - h3, h43=h4 - h3)
         # largest sines of the first pin and, per distance from it, of the bar
         of_pin = {1: 0.0, 2: 0.0, 3: a, 4: 0.0}

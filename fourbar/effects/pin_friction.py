@@ -96,23 +96,21 @@ class PinFriction(PinRows):
         J the slope of the right-hand side by x: of numbers that carry their derivatives
         the same steps are the theorem of the implicit function.
         """
-        loaded_pins = self.loaded_pins
-        arms = {pin: mu * r for pin, mu, r in self.pins if pin in loaded_pins}
+        arms = {pin: mu * r for pin, mu, r in self.pins if pin in self.loaded_pins}
         senses = {pin: actions.sense(pin) for pin in arms}
-        per_unit = {}  # under a couple of 1 N m at a pin, against its rotation
+        per_unit = []  # under a couple of 1 N m at a pin, against its rotation
         for pin, sense in senses.items():
             single = Actions(actions.state, actions.bodies)
             single.pin_couple(pin, -sense)
-            per_unit[pin] = solve_pin_forces(single, with_inertia=False)
+            per_unit.append(solve_pin_forces(single, with_inertia=False))
         shape = np.shape(pins.F12)
         forces = _list_forces(pins, arms)
-        per_couple = [_list_forces(per_unit[pin], arms) for pin in arms]
+        per_couple = [_list_forces(unit, arms) for unit in per_unit]
 
         C = np.stack([_stack(row, shape) for row in per_couple], axis=2)
         sliding = solve_sliding(_stack(forces, shape), C, _stack(arms.values(), shape))
-        couples = []
-        for column in sliding.x.T:
-            couples.append(make_like(column.reshape(shape), pins.F12.real))
+        like = pins.F12.real
+        couples = [make_like(column.reshape(shape), like) for column in sliding.x.T]
         slope = sliding.slope.reshape(*shape, len(arms), len(arms))
         # in numbers of the forces' kind
         inverse = _invert(slope)
@@ -125,10 +123,7 @@ class PinFriction(PinRows):
                 gaps.append(arm * np.abs(force) - couples[row])
             for row in range(len(arms)):
                 for column, gap in enumerate(gaps):
-                    rate = inverse[..., row, column]
-                    if isinstance(gap, np.ndarray):  # of single precision, for one
-                        rate = rate.astype(gap.dtype)
-                    couples[row] = couples[row] + rate * gap
+                    couples[row] = couples[row] + inverse[..., row, column] * gap
 
         for pin, couple in zip(arms, couples, strict=True):
             actions.pin_couple(pin, -senses[pin] * couple)

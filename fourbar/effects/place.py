@@ -88,8 +88,6 @@ class Place(NamedTuple):
 
     def in_one_pair(self) -> "Place":
         """Return a settled place as one pair from the bar's first pin."""
-        if self.from_centre is None:
-            return self
         return Place(self.bar, self.polar_from_pin())
 
     def vector(self) -> Any:

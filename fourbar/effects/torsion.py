@@ -1,7 +1,6 @@
 """Torsion springs at pins: a couple proportional to the angle between the two bars."""
 
 import math
-from copy import copy
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +11,8 @@ from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.path import ROLES_OF_BARS
 from fourbar.formulas.position import reorder_lengths
-from fourbar.linkage import PINS, POSITIVE, Declared, FourBar, record
-from fourbar.quantities import OK, WOUND, Array, Codes, Signs
+from fourbar.linkage import PINS, POSITIVE, Declared, FourBar, copy_with, record
+from fourbar.quantities import WOUND, Array, Codes, Signs
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
 """rad; at half a turn itself rounding would decide in which sense the spring turns."""
@@ -71,10 +70,7 @@ class Torsion(PinRows):
         for followed, (_, _, rest, _) in zip(angles, self.springs, strict=True):
             from_rest = followed - rest
             turns.append(math.tau * np.floor(from_rest / math.tau + 0.5))
-        # a constructor checks what a user gives, one number at a time
-        counted = copy(self)
-        object.__setattr__(counted, "turns", tuple(turns))
-        return counted
+        return copy_with(self, turns=tuple(turns))
 
     def status(
         self,
@@ -82,14 +78,13 @@ class Torsion(PinRows):
         branch: Signs | None,
     ) -> Codes | None:
         """Return WOUND at half a turn from rest and beyond."""
-        if self.turns is None or branch is None:
-            return None
-        wound = np.any([*self.list_wound(state, branch).values()], axis=0)
-        return np.where(wound, WOUND, OK).astype(np.uint8)
+        wound = [*self.list_wound(state, branch).values()]
+        return WOUND * np.any(wound, axis=0).astype(np.uint8) if wound else None
 
     def list_wound(self, state: State, branch: Number) -> dict[str, Number]:
         """List where each sprung pin is at half a turn from rest and beyond."""
-        assert self.turns is not None
+        if self.turns is None:
+            return {}
         angles = self._follow_angles(state, branch)
         rows = zip(angles, self.turns, self.springs, strict=True)
         return {
@@ -173,11 +168,7 @@ def _remove_jumps(state: State, branch: Number) -> dict[int, Number]:
     theta_3 = np.angle(u3) + half_turn
     theta_4 = np.angle(u4)
 
-    if bar == 2:
-        diagonal = state.position.diagonal
-    else:
-        diagonal = d * np.exp(1j * theta_1) - a * u2
-    phi = np.angle(diagonal)
+    phi = np.angle(d * np.exp(1j * theta_1) - a * u2)
     line = np.where(a < d, theta_1, theta_2 + math.pi)
     phi = line + wrap_angle(phi - line)
     outer, inner = state.passing

@@ -1,5 +1,6 @@
 """A scene as the numbers of the formulas, and its forces under all that acts."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,10 +19,10 @@ from fourbar.formulas.pin_forces import (
     inertia_wrenches,
     pin_forces,
 )
-from fourbar.formulas.position import HalfAngle, Loop, Passing, Position
+from fourbar.formulas.position import HalfAngle, Loop, Passing
 from fourbar.formulas.torque import driving_torque, half_slope, inertia
 from fourbar.linkage import MOVING_BARS, FourBar
-from fourbar.quantities import COUPLE, JAMMED, LINE, DriveNames, Indices, Signs
+from fourbar.quantities import COUPLE, JAMMED, DriveNames, Indices
 from fourbar.scene import Command, Scene
 
 if TYPE_CHECKING:
@@ -48,14 +49,27 @@ _NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
 
 
-def _condense_branch(branch: Signs) -> Any:
-    """Return the branch as one number if all positions share it, else as an array.
+class Couple(NamedTuple):
+    """Drive that exerts a couple on a bar, as a `ForceDrive` exerts a force."""
 
-    The formulas are quicker with one number.
-    """
-    if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
-        return float(branch.flat[0])
-    return branch
+    bar: int
+    names: DriveNames = COUPLE
+
+    @property
+    def may_be_left_out(self) -> tuple[int, ...]:
+        """Bar whose moment alone has the couple."""
+        return (self.bar,)
+
+    def gain(self, state: State) -> Any:
+        """Return h of the bar, the work of 1 N m per change of the angle."""
+        return state.k[self.bar - 2]
+
+    def leverage(self, state: State, path: LoopPath) -> tuple[Any, float]:
+        """Compute the sine between the two other bars, and its largest value."""
+        return path.drive_sine(state.position, self.bar), 1.0
+
+    def status(self, state: State, path: LoopPath) -> None:
+        """Return None: a couple has a direction and a lever everywhere."""
 
 
 class Dynamics(NamedTuple):
@@ -74,6 +88,10 @@ class Dynamics(NamedTuple):
     """
 
 
+PlacedPoint = tuple[str, int, Any]
+"""Name, bar, and place in the bar's frame from its first pin, complex, m."""
+
+
 class Case(NamedTuple):
     """A scene in the numbers of the formulas.
 
@@ -86,7 +104,7 @@ class Case(NamedTuple):
     >>> at = command(scene)
     >>> case = Case.of(scene)
     >>> state = case.at(at)
-    >>> dynamics = case.dynamics(state, at.acceleration)
+    >>> dynamics = case.dynamics(state)
     >>> dynamics.effort.round(4)
     array([-0.1207,  0.2423,  0.2899,  0.1913])
     """
@@ -96,21 +114,17 @@ class Case(NamedTuple):
     bodies: MovingBodies
     terms: "tuple[Effect, ...]"
     """Loads and effects, each a term of what acts; their places are settled."""
-    drive_bar: int
+    drive: "Couple | ForceDrive"
     path: LoopPath
     """Loop in the order of the commanded bar, whose lengths are in a unit of its own.
     `lengths` are in the usual order, m.
     """
-    points: tuple[tuple[str, int, Any], ...] = ()
-    """Points of the scene: name, bar, and place in the bar's frame, complex, m. The
-    frame begins at the bar's first pin.
-    """
+    points: tuple[PlacedPoint, ...]
+    """Pins A and B, mass centres, and points of the scene."""
     impending: Any = 0
     """Impending direction of rotation at pins at rest. Or the fraction of its torque
     with which friction holds them.
     """
-    drive: "ForceDrive | None" = None
-    """Drive that exerts a force in place of the couple on the driven bar."""
 
     @classmethod
     def of(cls, scene: Scene, bar: int = 2, impending: Any = 0) -> "Case":
@@ -119,25 +133,32 @@ class Case(NamedTuple):
         The command is that of bar 2, 3 or 4.
         """
         scene = scene.settled()
+        points = [(one.name, one.bar, one.place.vector()) for one in scene.points]
         terms = (*scene.loads, *scene.effects)
-        linkage = scene.linkage
+        drive = scene.drive or Couple(scene.drive_bar)
+        return cls._collect(scene.linkage, terms, drive, bar, points, impending)
+
+    @classmethod
+    def _collect(
+        cls,
+        linkage: FourBar,
+        terms: Any,
+        drive: Any,
+        bar: int,
+        points: Iterable[PlacedPoint],
+        impending: Any,
+    ) -> "Case":
+        """Collect what follows from a linkage and what acts on it."""
         path = prepare_path(linkage.lengths, linkage.ground_angle, bar)
-        points = tuple(
-            (point.name, point.bar, point.place.vector()) for point in scene.points
-        )
-        lengths = _restore_unit(linkage, path)
+        square = path.unit * path.unit
+        E1 = path.lengths.E1 * square
+        E2 = path.lengths.E2 * square
+        lengths = Loop(*linkage.lengths, E1, E2)
         bodies = list_bodies(linkage, terms)
-        return cls(
-            linkage,
-            lengths,
-            bodies,
-            terms,
-            scene.drive_bar,
-            path,
-            points,
-            impending,
-            scene.drive,
-        )
+        pins = ("A", 2, lengths.a), ("B", 4, lengths.c)
+        centres = ((f"G{bar}", bar, bodies[bar - 2].z) for bar in MOVING_BARS)
+        points = (*pins, *centres, *points)
+        return cls(linkage, lengths, bodies, terms, drive, path, points, impending)
 
     def beside(self, nominal: Scene) -> "Case":
         """Return the case of members near a nominal linkage.
@@ -160,50 +181,20 @@ class Case(NamedTuple):
     def lengthened(self) -> "Case":
         """Return the case in longer numbers, with all that follows from the scene."""
         linkage, terms, drive = change_numbers(
-            (self.linkage, self.terms, self.drive),
-            lengthen,
+            (self.linkage, self.terms, self.drive), lengthen
         )
-        path = prepare_path(linkage.lengths, linkage.ground_angle, self.path.bar)
-        path = path._replace(passing=self.path.passing)
-        bodies = list_bodies(linkage, terms)
-        lengths = _restore_unit(linkage, path)
-        return self._replace(
-            linkage=linkage,
-            lengths=lengths,
-            bodies=bodies,
-            terms=terms,
-            path=path,
-            drive=drive,
-        )
-
-    @property
-    def drive_names(self) -> DriveNames:
-        """Return the names of the drive's quantities."""
-        return COUPLE if self.drive is None else LINE
-
-    def sines(self, position: Position) -> dict[int, Any]:
-        """Compute the sines between two moving bars, by the number of the third bar."""
-        return {bar: self.path.drive_sine(position, bar) for bar in MOVING_BARS}
+        bar = self.path.bar
+        longer = self._collect(linkage, terms, drive, bar, (), self.impending)
+        return longer._replace(path=longer.path._replace(passing=self.path.passing))
 
     def drive_speed(self, state: State) -> Any:
         """Compute the speed of the driven bar, rad/s, or of the stroke, m/s."""
-        if self.drive is None:
-            return state.omega(self.drive_bar)
         return self.drive.gain(state) * state.speed
 
     def drive_condition(self, state: State) -> Any:
         """Compute the drive's leverage over the largest possible one, in [0, 1]."""
-        if self.drive is None:
-            return abs(self.path.drive_sine(state.position, self.drive_bar))
-        lever, most = self.drive.leverage(state, self.sines(state.position))
+        lever, most = self.drive.leverage(state, self.path)
         return abs(lever) / most
-
-    def list_statuses(self, state: State, branch: Any) -> list[Any]:
-        """List the statuses of everything that acts and of the drive, None for `OK`."""
-        statuses: list[Any] = [term.status(state, branch) for term in self.terms]
-        if self.drive is not None:
-            statuses.append(self.drive.status(state, self.sines(state.position)))
-        return statuses
 
     def assemble(
         self,
@@ -224,7 +215,9 @@ class Case(NamedTuple):
         q = at.angle
         speed: Any = 0.0
         acceleration: Any = 0.0
-        branch = _condense_branch(at.branch)
+        branch: Any = at.branch
+        if branch.ndim == 0 or (branch.size and branch.min() == branch.max()):
+            branch = float(branch.flat[0])  # the formulas are quicker with one number
         if moving:
             acceleration = at.acceleration
             if at.speed is not None:
@@ -253,6 +246,7 @@ class Case(NamedTuple):
             q,
             sine,
             path.passing,
+            acceleration,
         )
 
     def at(self, at: Command, *, moving: bool = True) -> State:
@@ -262,14 +256,6 @@ class Case(NamedTuple):
         """
         half, _ = self.half_angle(at)
         return self.assemble(at, half, moving=moving)
-
-    @classmethod
-    def of_released(cls, scene: Scene, bar: int, impending: Any) -> "Case":
-        """Collect the numbers of a released linkage, read in the angle of bar 2 or 4.
-
-        No couple drives a released linkage.
-        """
-        return cls.of(scene, bar, impending)._replace(drive_bar=bar, drive=None)
 
     def begin_with(self, motion: Command) -> "Case":
         """Return a copy whose path-dependent effects begin where a motion assembles.
@@ -323,12 +309,7 @@ class Case(NamedTuple):
         )
         return half, index
 
-    def _compute_inertial_forces(
-        self,
-        state: State,
-        acceleration: Any,
-        sine: Any,
-    ) -> "_InertialForces":
+    def _compute_inertial_forces(self, state: State, sine: Any) -> "_InertialForces":
         """Compute d'Alembert's forces and moments, and their generalized force.
 
         `sine`: of theta_3 - theta_2 if the moment about pin B is wanted, otherwise
@@ -337,6 +318,7 @@ class Case(NamedTuple):
         a = self.lengths.a
         position = state.position
         k = state.k
+        acceleration = state.q_acceleration
         square = state.speed * state.speed
         wrenches, mass_at_A = inertia_wrenches(a, self.bodies, position, state.moving)
         inertial = others = half_slope(a, self.bodies, position, k) * square
@@ -348,34 +330,21 @@ class Case(NamedTuple):
             others = (
                 others - (about_first_pin(self.bodies[0]) * (k.h2 * k.dh2)) * square
             )
-        if sine is None:
-            about_B = 0.0
-        else:
-            about_B = coupler_about_B(
-                self.lengths,
-                self.bodies[1],
-                position,
-                state.moving,
-                sine,
-            )
+        about_B = 0.0
+        if sine is not None:
+            three = self.bodies[1]
+            about_B = coupler_about_B(self.lengths, three, position, state.moving, sine)
         return _InertialForces(inertial, others, wrenches, mass_at_A, about_B)
 
-    def dynamics(self, state: State, acceleration: Any, impending: Any = 0) -> Dynamics:
-        """Compute pin forces and the drive under everything that acts.
-
-        For the parameters see `Actions`.
-        """
-        actions = Actions(state, self.bodies, impending).add(self.terms)
-        if self.drive is None:
-            may_be_left_out: tuple[int, ...] = (self.drive_bar,)
-            gain = state.k[self.drive_bar - 2]
-        else:
-            may_be_left_out = self.drive.may_be_left_out
-            gain = self.drive.gain(state)
+    def dynamics(self, state: State) -> Dynamics:
+        """Compute pin forces and the drive under everything that acts."""
+        actions = Actions(state, self.bodies, self.impending).add(self.terms)
+        gain = self.drive.gain(state)
         sines = {
-            bar: self.path.drive_sine(state.position, bar) for bar in may_be_left_out
+            bar: self.path.drive_sine(state.position, bar)
+            for bar in self.drive.may_be_left_out
         }
-        inertial = self._compute_inertial_forces(state, acceleration, sines.get(4))
+        inertial = self._compute_inertial_forces(state, sines.get(4))
         free_bodies = _FreeBodies(state, inertial, sines, self.drive, gain)
         friction = SolvedFriction(free_bodies.solve_pin_forces(actions))
         # a scene holds one effect of a kind, and one kind depends on the forces
@@ -390,12 +359,7 @@ class Case(NamedTuple):
         effort = driving_torque(gain, inertial.total, Q)
         return Dynamics(*friction, effort, inertial.total - Q)
 
-    def drive_interval(
-        self,
-        state: State,
-        acceleration: Any,
-        effort: Any,
-    ) -> tuple[Any, Any, Any]:
+    def drive_interval(self, state: State, effort: Any) -> tuple[Any, Any, Any]:
         """Compute the least and greatest torque (N m) or force (N) of the drive, (n,).
 
         Both are equal unless dry friction holds a pin at rest. The third value, (n,),
@@ -414,22 +378,14 @@ class Case(NamedTuple):
         )
         if np.all(state.speed) and all_turn:
             return effort, effort, None
-        ahead = self.dynamics(state, acceleration, 1)
-        back = self.dynamics(state, acceleration, -1)
+        ahead = self._replace(impending=1).dynamics(state)
+        back = self._replace(impending=-1).dynamics(state)
         low = np.minimum(ahead.effort, back.effort)
         high = np.maximum(ahead.effort, back.effort)
         statuses = [one.status for one in (ahead, back) if one.status is not None]
         if not statuses:
             return low, high, None
         return low, high, JAMMED * np.any(np.equal(statuses, JAMMED), axis=0)
-
-
-def _restore_unit(linkage: FourBar, path: LoopPath) -> Loop:
-    """Return the lengths in m, and what they decide together in m^2."""
-    square = path.unit * path.unit
-    E1 = path.lengths.E1 * square
-    E2 = path.lengths.E2 * square
-    return Loop(*linkage.lengths, E1, E2)
 
 
 class _InertialForces(NamedTuple):
@@ -453,8 +409,7 @@ class _FreeBodies(NamedTuple):
     inertial: _InertialForces
     sines: dict[int, Any]
     """Sines between the two other bars, by the bar whose moment is left out."""
-    drive: "ForceDrive | None"
-    """Drive that exerts a force; None: it is a couple on a bar."""
+    drive: "Couple | ForceDrive"
     gain: Any
     """h of the driven bar, or ds/dq of the drive that exerts a force, m."""
 
@@ -472,7 +427,7 @@ class _FreeBodies(NamedTuple):
         bar 3, the pair of bars whose directions differ most keeps the digits.
         """
         inertial = self.inertial if with_inertia else _InertialForces()
-        if self.drive is not None:
+        if not isinstance(self.drive, Couple):
             Q = actions.generalized_forces()[0]
             force = driving_torque(self.gain, inertial.total, Q)
             actions = actions.plus(self.drive, force)

@@ -11,22 +11,20 @@ import cmath
 from collections.abc import Callable, Iterable, Set
 from functools import reduce
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fourbar.errors import InputError
-from fourbar.evaluation.case import Case, Dynamics
+from fourbar.evaluation.case import Case, Couple, Dynamics
 from fourbar.formulas import longer as longer_numbers
 from fourbar.formulas.arithmetic import U, angle, is_any, is_zero, select
 from fourbar.formulas.longer import lengthen, shorten
 from fourbar.formulas.mobility import TURN
-from fourbar.formulas.motion import State
+from fourbar.formulas.motion import Frame, State
 from fourbar.formulas.path import NO_DIGIT_LEFT, LoopPath
 from fourbar.quantities import (
     CHANGE_POINT,
-    COUPLE,
-    LINE,
     LINE_QUANTITIES,
     NO_DIRECTION,
     NO_LEVER,
@@ -38,18 +36,14 @@ from fourbar.quantities import (
     RATES,
     SEVERAL,
     SINGULAR,
-    STAGE_OF,
     STAGES,
     WOUND,
     Codes,
     Indices,
+    find_quantity,
 )
 from fourbar.scene import Command
 from fourbar.scene.motion import COMMAND_NAMES
-from fourbar.scene.numbers import POINT_STAGES
-
-if TYPE_CHECKING:
-    from fourbar.effects import ForceDrive
 
 FORCE = STAGES.index("force")
 ERROR = STAGES.index("error")
@@ -107,11 +101,12 @@ def evaluate(
     _blank(values, values.keys() - stated, codes == NOT_ASSEMBLED)
     if last_stage < FORCE:
         return Evaluated(codes, values, state)
-    dynamics = case.dynamics(state, command.acceleration, case.impending)
-    forces, jammed = _list_forces(case, command, state, dynamics, wanted)
+    dynamics = case.dynamics(state)
+    forces, jammed = _list_forces(case, state, dynamics, wanted)
     if last_stage == ERROR:
         forces |= _list_error_bars(case, command, state, dynamics, refined_rows)
-    statuses = (*case.list_statuses(state, command.branch), dynamics.status, jammed)
+    statuses = [term.status(state, command.branch) for term in case.terms]
+    statuses += [case.drive.status(state, case.path), dynamics.status, jammed]
     stated_codes = [status for status in statuses if status is not None]
     if stated_codes:
         of_effects = np.max(stated_codes, axis=0)
@@ -140,7 +135,6 @@ def _blank(values: dict[str, Any], names: Iterable[str], missing: Any) -> None:
 def evaluate_released(
     case: Case,
     command: Command,
-    drive: "ForceDrive | None",
     last_stage: int,
     wanted: Set[str],
 ) -> Evaluated:
@@ -148,12 +142,13 @@ def evaluate_released(
 
     Results are those of a command of theta_2, in whichever bar's angle they are read.
     """
-    codes, values, state = evaluate(case, command, last_stage, wanted)
+    released = case._replace(drive=Couple(command.bar))
+    codes, values, state = evaluate(released, command, last_stage, wanted)
     by_input = state._replace(bar=2, sine=state.position.sin_mu)
     others = wanted & {"theta_4", "condition", *LINE_QUANTITIES}
-    values |= list_kinematics(case._replace(drive=drive), by_input, others)
+    values |= list_kinematics(case, by_input, others)
     if last_stage >= FORCE:
-        of_drive = {"power", *(COUPLE if drive is None else LINE)}
+        of_drive = {"power", *case.drive.names}
         values |= {name: np.zeros(codes.shape) for name in of_drive & wanted}
     return Evaluated(codes, values, state)
 
@@ -169,9 +164,6 @@ def _find_codes_of_loop(path: LoopPath, state: State, command: Command) -> Any:
         return OK
     size = np.minimum(size, command.condition)
     codes = np.zeros(np.shape(sine), dtype=np.uint8)
-    if np.min(size, initial=np.inf) > margin:
-        return codes
-    # some are at a limit, or NaN: the loop does not close there
     codes[size <= margin] = SINGULAR
     codes[(abs(sine) <= margin) & path.passes_zero(half) & is_determined] = CHANGE_POINT
     codes[np.isnan(sine)] = NOT_ASSEMBLED
@@ -181,18 +173,14 @@ def _find_codes_of_loop(path: LoopPath, state: State, command: Command) -> Any:
 
 
 def _list_forces(
-    case: Case,
-    command: Command,
-    state: State,
-    dynamics: Dynamics,
-    wanted: Set[str],
+    case: Case, state: State, dynamics: Dynamics, wanted: Set[str]
 ) -> tuple[dict[str, Any], Any]:
     """List the quantities of the force stage.
 
     The second result has the status `JAMMED` where friction jams a motion that would
     begin; None: nowhere.
     """
-    names = case.drive_names
+    names = case.drive.names
     values = {**dynamics.pins._asdict(), names.value: dynamics.effort}
     jammed = None
     if "power" in wanted:
@@ -203,9 +191,7 @@ def _list_forces(
         values["friction_residual"] = dynamics.residual
     if names.low in wanted or names.high in wanted:
         values[names.low], values[names.high], jammed = case.drive_interval(
-            state,
-            command.acceleration,
-            dynamics.effort,
+            state, dynamics.effort
         )
     return values, jammed
 
@@ -250,8 +236,7 @@ def _list_error_bars(
         )
     motion = command._replace(angle=q, speed=speed, acceleration=acceleration)
     near = longer.assemble(motion, half)
-    longer_dynamics = longer.dynamics(near, acceleration, case.impending)
-    gaps = _compute_gaps(dynamics, longer_dynamics)
+    gaps = _compute_gaps(dynamics, longer.dynamics(near))
     if longer_numbers.HAS_LONG_DOUBLES and remainder is None:
         gaps = np.fmax(gaps, _compute_unresolved(case, command, state, dynamics))
     sizes = (reduce(np.maximum, map(np.abs, dynamics.pins)), np.abs(dynamics.effort))
@@ -261,7 +246,7 @@ def _list_error_bars(
         width = np.maximum(gap, U * size)
         # where the longer number is not finite as a double no digit is left
         bars.append(select(np.isfinite(width), width, size))
-    return {"force_error": bars[0], case.drive_names.error: bars[1]}
+    return {"force_error": bars[0], case.drive.names.error: bars[1]}
 
 
 def _compute_gaps(one: Dynamics, other: Dynamics) -> Any:
@@ -303,7 +288,7 @@ def _compute_unresolved(
         case.path.half_angle(moved),
     )
     try:
-        there = case.dynamics(shifted, command.acceleration, case.impending)
+        there = case.dynamics(shifted)
     except InputError:  # a load's table ends here
         return np.nan
     most = np.where(is_zero(case.linkage.ground_angle), 2.0 * TURN, np.inf)
@@ -333,27 +318,21 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
     for name in suspects:
         infinite = ~np.isfinite(values[name])
         _blank(values, [name], infinite)
-        stage = _find_stage(name)
+        stage = find_quantity(name).stage_number
         fails = infinite & (has_forces if stage >= FORCE else has_motion)
         first[fails] = np.minimum(first[fails], stage)
     gone = first < len(STAGES)
     if not gone.any():
         return
     code[gone] = OVERFLOW
-    if case.drive is None:
+    if isinstance(case.drive, Couple):
         # where the two bars that are not driven are in line, no finite forces hold
         # them in balance
-        sine = case.path.drive_sine(state.position, case.drive_bar)
+        sine, _ = case.drive.leverage(state, case.path)
         in_line = np.abs(sine) <= NO_DIGIT_LEFT
         code[gone & (first >= FORCE) & in_line] = NO_TORQUE
     for name in values.keys() - {"drive_condition"}:
-        _blank(values, [name], first <= _find_stage(name))
-
-
-def _find_stage(name: str) -> int:
-    """Return the number of a quantity's stage, also of the scene's points."""
-    of_point = POINT_STAGES.get(name[:2], "position")
-    return STAGES.index(STAGE_OF.get(name, of_point))
+        _blank(values, [name], first <= find_quantity(name).stage_number)
 
 
 SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
@@ -365,20 +344,16 @@ SCALAR_FORMULAS: dict[str, Callable[[State], Any]] = {
     **{name: attrgetter(f"moving.{name}") for name in RATES},
 }
 """Formulas of the scalars that come before the forces, by name."""
-POINT_VECTORS = frozenset(
-    start + name for start in POINT_STAGES for name in ("A", "B", "G2", "G3", "G4")
-)
-"""Names of the vectors before the forces, at the pins and mass centres."""
 
 
 def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any]:
-    """List the named quantities before the forces, and those of the scene's points."""
+    """List the named quantities before the forces."""
     values = {
         name: formula(state)
         for name, formula in SCALAR_FORMULAS.items()
         if name in wanted
     }
-    if case.drive is not None and not wanted.isdisjoint(LINE_QUANTITIES):
+    if not (isinstance(case.drive, Couple) or wanted.isdisjoint(LINE_QUANTITIES)):
         stroke, direction = case.drive.line(state)
         if "drive_line" in wanted:
             values["drive_line"] = direction
@@ -386,25 +361,20 @@ def list_kinematics(case: Case, state: State, wanted: Set[str]) -> dict[str, Any
             values["stroke_speed"] = case.drive_speed(state)
         if "stroke" in wanted and case.drive.has_stroke:
             values["stroke"] = stroke
-    if not case.points and wanted.isdisjoint(POINT_VECTORS):
-        return values
-    lengths = case.lengths
-    two, three, four = case.bodies
-    places: dict[int, list[tuple[str, Any]]] = {
-        2: [("A", lengths.a), ("G2", two.z)],
-        3: [("G3", three.z)],
-        4: [("B", lengths.c), ("G4", four.z)],
-    }
+    frames: dict[int, Frame] = {}
     for name, bar, z in case.points:
-        places.setdefault(bar, []).append((name, z))
-    for bar, of_bar in places.items():
-        frame = state.frame(bar)
-        for name, z in of_bar:
-            r = z * frame.u
-            if name in wanted:
-                values[name] = frame.pin + r
-            if (velocity := f"v_{name}") in wanted:
-                values[velocity] = frame.velocity(r)
-            if (acceleration := f"a_{name}") in wanted:
-                values[acceleration] = frame.acceleration(r)
+        velocity = f"v_{name}"
+        acceleration = f"a_{name}"
+        if wanted.isdisjoint((name, velocity, acceleration)):
+            continue
+        if bar not in frames:
+            frames[bar] = state.frame(bar)
+        frame = frames[bar]
+        r = z * frame.u
+        if name in wanted:
+            values[name] = frame.pin + r
+        if velocity in wanted:
+            values[velocity] = frame.velocity(r)
+        if acceleration in wanted:
+            values[acceleration] = frame.acceleration(r)
     return values

@@ -35,8 +35,7 @@ from fourbar.formulas.motion import State, rates
 from fourbar.formulas.path import NO_DIGIT_LEFT, drive_sine, prepare_path
 from fourbar.formulas.torque import half_slope, inertia
 from fourbar.quantities import NO_DIRECTION, Array
-from fourbar.scene import Command, ReleaseOrigin, Scene, command
-from fourbar.scene.scene import say_range
+from fourbar.scene import Command, ReleaseOrigin, Scene, command, say_range
 
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
@@ -281,7 +280,7 @@ class _Run:
     def begin(self, start: Command) -> tuple[_Reading, Array]:
         """Read the motion where it is released."""
         bar = start.bar
-        case = Case.of_released(self.scene, bar, 0)
+        case = Case.of(self.scene, bar)
         if any(term.loaded_pins for term in case.terms):
             raise LimitError(
                 "a free motion cannot carry friction that depends on the pin forces:"
@@ -304,8 +303,7 @@ class _Run:
                     "released, and a force along their line has no direction"
                 )
         y = np.zeros(4)
-        for row, of_bar in enumerate((2, 4)):
-            y[row] = theta if of_bar == bar else angle(state.direction(of_bar))
+        y[:2] = [theta if k == bar else angle(state.direction(k)) for k in (2, 4)]
         reading = self._read_in(bar if bar != 3 else 2, state, y)
         if reading.measure_room(state) < 0.0:
             reading = self._read_in(6 - reading.bar, state, y)
@@ -319,7 +317,7 @@ class _Run:
 
     def _read_in(self, bar: int, state: State, y: Array) -> _Reading:
         """Read a motion in the angle of bar 2 or 4, from one of its positions."""
-        case = Case.of_released(self.scene, bar, 0)
+        case = Case.of(self.scene, bar)
         sine = float(drive_sine(state.position, bar))
         q = float(y[0] if bar == 2 else y[1])
         return _Reading(case, float(case.path.sign(q, math.copysign(1.0, sine))))
@@ -339,9 +337,8 @@ class _Run:
                 return
             solved = self._integrate(reading, start, y)
             start = float(solved.t[-1])
-            turns_back = self._find_turns(reading, solved)
-            stretch = _Stretch(reading, start, solved.sol, turns_back)
-            self.stretches.append(stretch)
+            extremes = self._find_extremes(reading, solved)
+            self.stretches.append(_Stretch(reading, start, solved.sol, extremes))
             if start == self.end:
                 return
             y = np.array(solved.y[:, -1])
@@ -405,7 +402,7 @@ class _Run:
             )
         return solved
 
-    def _find_turns(self, reading: _Reading, solved: Any) -> list[float]:
+    def _find_extremes(self, reading: _Reading, solved: Any) -> list[float]:
         """Find the times in a stretch at which an angle or sin(mu) turns back.
 
         The times at which all bars are collinear are noted: another motion is possible
@@ -423,14 +420,13 @@ class _Run:
             y = solved.sol(times)
             state = reading.state(y)
             k = state.k
-            u3 = state.direction(3)
-            cosine = (state.direction(4) * np.conj(u3)).real
-            coefficients = np.broadcast_arrays(k.h2, k.h3, k.h4, cosine * k.h43, y[2])
+            cosine = (state.direction(4) * np.conj(state.direction(3))).real
+            coefficients = np.broadcast_arrays(k.h2, k.h3, k.h4, cosine * k.h43)
             slopes = np.array(coefficients, dtype=float)
-            sizes = np.abs(slopes[:4])
-            slopes[:4][sizes <= _STANDS * sizes.max(axis=0)] = 0.0
+            sizes = np.abs(slopes)
+            slopes[sizes <= _STANDS * sizes.max(axis=0)] = 0.0
             collinear = [np.sin(0.5 * (reading.angle(y) - point)) for point in points]
-            return np.array([*slopes, *collinear])
+            return np.array([*slopes, y[2], *collinear])
 
         # a step may be several turns long
         turned = np.abs(np.diff(reading.angle(solved.y)))
@@ -438,34 +434,33 @@ class _Run:
         rows = np.arange(parts * turned.size + 1) / parts
         times = np.interp(rows, np.arange(solved.t.size), solved.t)
         values = watch(times)
-        found = [float(time) for event in solved.t_events[1:] for time in event]
-        for row, step in np.argwhere(values[:, 1:] * values[:, :-1] <= 0.0):
-            low = values[row, step]
-            high = values[row, step + 1]
-            if row < 5 and not low * high:
+        extremes = [float(time) for event in solved.t_events[1:] for time in event]
+        signs = values[:, 1:] * values[:, :-1]
+        for row, step in np.argwhere(signs <= 0.0):
+            turns_back = row < 5
+            if turns_back and not signs[row, step]:
                 continue
             time = brentq(
                 lambda time, row: float(watch(np.array([time]))[row, 0]),
-                times[step],
-                times[step + 1],
+                *times[step : step + 2],
                 (row,),
                 xtol=1e-15,
             )
-            (found if row < 5 else self.change_points).append(time)
-        return found
+            (extremes if turns_back else self.change_points).append(time)
+        return extremes
 
     def _read(self, stretch: _Stretch, times: Array) -> Array:
-        """Read instants of a stretch, (n, 12), as `report` needs them."""
+        """Read instants of a stretch, (n, 13), as `report` needs them."""
         reading = stretch.reading
         y = stretch.solve(times)
         state = reading.state(y)
-        q = reading.angle(y)
         theta_2, _, rate, work = y
         if reading.bar != 2:
             theta_2 = _count_turns(state.direction(2), theta_2)
         growth = 0.0 if reading.stands else reading.compute_rates(y)[2]
         moving = rates(state.k, rate, growth)
         columns = (
+            times,
             theta_2,
             moving.omega_2,
             moving.alpha_2,
@@ -473,7 +468,7 @@ class _Run:
             0.5 * reading.inertia(state) * rate * rate,
             work,
             reading.bar,
-            q,
+            state.q,
             rate,
             growth,
             reading.branch,
@@ -484,7 +479,6 @@ class _Run:
     def report(self, times: Array) -> Released:
         """Report the motion at times, (n,) rising from 0, s."""
         linkage = self.scene.linkage
-        reported = []
         rows = []
         due = times
         with np.errstate(all="ignore"):
@@ -494,23 +488,23 @@ class _Run:
                 extremes = [time for time in stretch.extremes if time <= times[-1]]
                 now = np.union1d(now, extremes)
                 if now.size:
-                    reported.append(now)
                     rows.append(self._read(stretch, now))
             columns = np.concatenate(rows).T
-        theta_2, omega_2, alpha_2, sine, energy, work, bar, *independent = columns
+        instants, theta_2, omega_2, alpha_2, sine, energy, work, bar, *independent = (
+            columns
+        )
         path = prepare_path(linkage.lengths, linkage.ground_angle)
         signs = np.array(path.sign(theta_2, np.copysign(1.0, sine)))
         # at a limit of theta_2 both branches meet, and the last one goes on
         is_sure = np.abs(sine) > NO_DIGIT_LEFT
         last = np.maximum.accumulate(np.where(is_sure, np.arange(sine.size), -1))
         signs = np.where(last < 0, command(self.scene).branch[0], signs[last])
-        instants = np.concatenate(reported)
         whole = Command(
             theta_2,
             signs.astype(np.int8),
             omega_2,
             alpha_2,
-            time=instants,
+            time=instants.copy(),
             origin=ReleaseOrigin(bar.astype(np.int8), *independent),
         )
         motion = whole.part(np.isin(instants, times))
@@ -518,13 +512,10 @@ class _Run:
             self._require_unwound(motion)
         largest = float(np.max(np.abs([energy, work])))
         drift = float(np.max(np.abs(energy - energy[0] - work)))
-        released = Released(
-            motion,
-            drift / largest if largest else 0.0,
-            # two may lie within one step
-            tuple(sorted({time for time in self.change_points if time <= times[-1]})),
-            whole,
-        )
+        # two may lie within one step
+        passed = {time for time in self.change_points if time <= times[-1]}
+        drift = drift / largest if largest else 0.0
+        released = Released(motion, drift, tuple(sorted(passed)), whole)
         released._run = self
         return released
 
@@ -533,18 +524,15 @@ class _Run:
         with np.errstate(all="ignore"):
             begun = Case.of(self.scene).begin_with(motion.part(slice(0, 1)))
             state = begun.at(motion)
+            wound = []
             for term in begun.terms:
-                codes = term.status(state, motion.branch) if term.counts_turns else None
-                if codes is None or not codes.any():
-                    continue
-                assert motion.time is not None
-                first = np.argmax(codes)
-                wound = term.list_wound(state, motion.branch)
-                pin = next((pin for pin, rows in wound.items() if rows[first]), "")
-                raise LimitError(
-                    f"effects.{term.key}{'.' * bool(pin)}{pin}: at"
-                    f" {motion.time[first]:.6g} s the free motion has turned"
-                    f" {pin or 'a pin'} by more than half a turn from the rest of its"
-                    " spring, which is not modelled: state a shorter"
-                    " motion.free.duration"
-                )
+                for pin, rows in term.list_wound(state, motion.branch).items():
+                    instants = motion.places[rows]
+                    wound += [(time, f"{term.key}.{pin}", pin) for time in instants[:1]]
+        if wound:
+            time, key, pin = min(wound)
+            raise LimitError(
+                f"effects.{key}: at {time:.6g} s the free motion has turned {pin} by"
+                " more than half a turn from the rest of its spring, which is not"
+                " modelled: state a shorter motion.free.duration"
+            )

@@ -26,14 +26,13 @@ from fourbar.linkage import (
     FourBar,
 )
 from fourbar.quantities.units import half_unit_of_text
-from fourbar.scene import Command, Scene, find_signs
+from fourbar.scene import Command, Scene, find_signs, require_cylinder
 from fourbar.scene.drawing import DRAWN_WORD, DrawnPins, PlanePoint
 from fourbar.scene.motion import (
     BAR_OF_ANGLE,
     STROKE_COMMAND,
     Motion,
 )
-from fourbar.scene.scene import require_cylinder
 from fourbar.solving import solve
 
 

@@ -210,7 +210,7 @@ def turns_fully(linkage: FourBar, bar: int = 2) -> bool:
     Change points may lie within the turn.
     """
     reach = reach_of(linkage, bar)
-    return reach.beyond_folded <= 0.0 and reach.beyond_stretched <= 0.0
+    return max(reach.beyond_folded, reach.beyond_stretched) <= 0.0
 
 
 def choose_range(

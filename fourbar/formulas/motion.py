@@ -130,16 +130,9 @@ def take_sines_of_rates(lengths: Loop, position: Position, k: Coefficients) -> P
     cosine_4 = (position.u4 * position.u1.conjugate()).real
     u3 = vector(cosine_3, sine_3) * position.u1
     u4 = vector(cosine_4, sine_4) * position.u1
-    return Position(
-        position.u1,
-        position.u2,
-        select(fast, u3, position.u3),
-        select(fast, u4, position.u4),
-        position.sin_mu,
-        position.diagonal,
-        position.e2,
-        position.root,
-        position.half,
+    return position._replace(
+        u3=select(fast, u3, position.u3),
+        u4=select(fast, u4, position.u4),
     )
 
 
@@ -242,6 +235,8 @@ class State(NamedTuple):
     """
     passing: Passing = Passing(False, False)
     """Roots of the path that pass through zero at a change point."""
+    q_acceleration: Number = 0.0
+    """q'' of the independent angle, rad/s^2."""
 
     def direction(self, bar: int) -> Number:
         """Return e^{i theta} of bar 1 (from O2 to O4), 2, 3 or 4."""

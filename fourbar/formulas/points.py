@@ -82,15 +82,10 @@ class Centre(NamedTuple):
 
 
 def locate_centres(
-    O4: Number,
-    A: Number,
-    B: Number,
-    u1: Number,
-    u2: Number,
-    u3: Number,
-    u4: Number,
+    O4: Number, A: Number, B: Number, *along: Number
 ) -> dict[tuple[int, int], Centre]:
     """Locate the six instant centres, complex, from the pins and the bars' lines."""
+    u1, u2, u3, u4 = along
     one = np.ones(np.shape(A))
     pins = {(1, 2): 0.0 * A, (2, 3): A, (3, 4): B, (1, 4): O4}
     centres = {bars: Centre(pin.real, pin.imag, one) for bars, pin in pins.items()}

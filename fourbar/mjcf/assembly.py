@@ -12,7 +12,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from fourbar.effects.effect import list_bodies
 from fourbar.errors import LimitError, clean_line
+from fourbar.formulas.pin_forces import Body
 from fourbar.linkage import BAR_NAMES, FIRST_PIN, MOVING_BARS
 from fourbar.mjcf.document import NOTES, Start, find_start
 from fourbar.mjcf.model import (
@@ -37,8 +39,8 @@ class Assembly(NamedTuple):
     """First pin of each bar, m."""
     numbers: tuple[float, ...]
     """theta_2, theta_3, theta_4, and the speeds of joints O2, A, O4."""
-    inertia: dict[int, float]
-    """Inertia of each moving bar about its mass centre, with a flywheel's, kg m^2."""
+    bodies: dict[int, Body]
+    """Inertial properties of the moving bars, with a flywheel's inertia."""
     gravity: tuple[float, float]
     """m/s^2."""
     dynamics: dict[str, dict[str, float]]
@@ -81,28 +83,34 @@ def assemble(
         raise LimitError(f"a drive that exerts a force has no counterpart in {form}")
     linkage = scene.linkage
     require_carriable(linkage)
-    inertia = {number: linkage.bar(number).moment_of_inertia for number in MOVING_BARS}
     gravity = (0.0, 0.0)
     dynamics = dict[str, dict[str, float]]()
     effect: Any
     for effect in scene.effects:
         if effect.key == "gravity":
-            gravity = (float(effect.vector[0]), float(effect.vector[1]))
-        elif effect.key == "flywheel":
-            inertia[effect.bar] += effect.inertia
+            gravity = effect.vector
         elif reader in effect.joint_elements:
             name = effect.joint_elements[reader]
             for pin, value in effect.rows:
                 dynamics.setdefault(pin, {})[name] = value
-        else:
+        elif effect.key != "flywheel":
             raise LimitError(f"the effect {effect.key!r} has no counterpart in {form}")
-    (theta_2, of_3_to_2, theta_4), speeds = (start or find_start(scene))[:2]
+    (theta_2, of_3_to_2, theta_4), speeds, _ = start or find_start(scene)
     theta_3 = theta_2 + of_3_to_2
-    foot = {1: 0j, 2: 0j, 3: cmath.rect(linkage.input.length, theta_2)}
-    foot[4] = cmath.rect(linkage.ground, linkage.ground_angle)
-    turn = {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4}
-    numbers = (theta_2, theta_3, theta_4, *speeds)
-    return Assembly(turn, foot, numbers, inertia, gravity, dynamics)
+    bodies = list_bodies(linkage, scene.effects)
+    return Assembly(
+        {1: 0.0, 2: theta_2, 3: theta_3, 4: theta_4},
+        {
+            1: 0j,
+            2: 0j,
+            3: cmath.rect(linkage.input.length, theta_2),
+            4: cmath.rect(linkage.ground, linkage.ground_angle),
+        },
+        (theta_2, theta_3, theta_4, *speeds),
+        dict(zip(MOVING_BARS, bodies, strict=True)),
+        gravity,
+        dynamics,
+    )
 
 
 def _write_comment(
@@ -114,12 +122,11 @@ def _write_comment(
     plane: Plane = LEVEL,
 ) -> str:
     """Say in what state the file stands, and where its reader's numbers are."""
-    notes = NOTES["assembled"]
+    notes = {key: note.strip() for key, note in NOTES["assembled"].items()}
     bar = scene.drive_bar
     joint = f", joint {FIRST_PIN[bar]}" if bar != 3 else ""
-    opens = notes["opens"].strip()
     lines = [
-        opens.format(*map(repr, assembly.numbers), form=form, at_B=at_B),
+        notes["opens"].format(*map(repr, assembly.numbers), form=form, at_B=at_B),
         notes["drive"].format(bar=bar, joint=joint),
     ]
     if scene.loads:
@@ -129,8 +136,8 @@ def _write_comment(
     if plane.is_tilted:
         axes = ", ".join(f"({write_six_digits(*axis)})" for axis in plane.rotation.T)
         gravity = write_exactly(*plane.turn(*assembly.gravity))
-        lines.append(notes["tilted"].strip().format(axes=axes, gravity=gravity))
-    return "\n".join([*lines, notes[reader].strip()])
+        lines.append(notes["tilted"].format(axes=axes, gravity=gravity))
+    return "\n".join([*lines, notes[reader]])
 
 
 DRAKE_NAMESPACE = "http://drake.mit.edu"
@@ -170,7 +177,7 @@ def write_sdf(
     plane = plane.moved(*scene.origin)
     form = f"SDF for {reader}"
     assembled = assemble(scene, start, form, reader, without_loads=without_loads)
-    turn, foot, numbers, inertia, gravity, dynamics = assembled
+    turn, foot, numbers, bodies, gravity, dynamics = assembled
     root = ET.Element("sdf", version="1.9")
     at_B = ""
     if reader == "gazebo":
@@ -187,15 +194,12 @@ def write_sdf(
     if plane.is_moved:
         _add(model, "pose", (*plane.origin, *plane.roll_pitch_yaw))
 
-    def add_link(bar: int, mass: float, inertia: float, centre: complex) -> None:
+    def add_link(bar: int, body: Body) -> None:
         # izz alone acts in the plane; three equal ones are a possible body
-        tensor = dict.fromkeys(("ixx", "iyy", "izz"), inertia)
+        tensor = dict.fromkeys(("ixx", "iyy", "izz"), body.I)
         tensor |= dict.fromkeys(("ixy", "ixz", "iyz"), 0.0)
-        inertial = {
-            "pose": (centre.real, centre.imag, 0, 0, 0, 0),
-            "mass": mass,
-            "inertia": tensor,
-        }
+        centre = body.z.real, body.z.imag, 0, 0, 0, 0
+        inertial = {"pose": centre, "mass": body.m, "inertia": tensor}
         pose = foot[bar].real, foot[bar].imag, 0, 0, 0, turn[bar]
         link = {"pose": pose, "inertial": inertial}
         _add(model, "link", link, name=BAR_NAMES[bar])
@@ -208,12 +212,11 @@ def write_sdf(
         joint = {**ends, "axis": axis, **more}
         _add(model, "joint", joint, name=pin, type="revolute")
 
-    add_link(1, 1.0, 1.0, 0j)
+    add_link(1, Body(1.0, 1.0, 0j))
     ends = {"parent": "world", "child": BAR_NAMES[1]}
     _add(model, "joint", ends, name="ground_on_world", type="fixed")
-    for number in MOVING_BARS:
-        bar = linkage.bar(number)
-        add_link(number, bar.mass, inertia[number], bar.to_centre)
+    for number, body in bodies.items():
+        add_link(number, body)
         add_joint(FIRST_PIN[number], _PARENT[number], number)
     length_3 = linkage.coupler.length
     if reader == "gazebo":  # the pose is in the frame of the child
@@ -263,20 +266,18 @@ def write_usd(
     linkage = scene.linkage
     plane = plane.moved(*scene.origin)
     assembled = assemble(scene, start, "USD", None, without_loads=without_loads)
-    turn, foot, _, inertia, (x, y), _ = assembled
+    turn, foot, _, bodies, (x, y), _ = assembled
     pull = math.hypot(x, y)
-    bodies = []
-    for number in MOVING_BARS:
-        bar = linkage.bar(number)
-        centre = bar.to_centre
+    bars = []
+    for number, (mass, inertia, centre) in bodies.items():
         place = plane.place(foot[number].real, foot[number].imag)
-        bodies.append(f"""    def Xform "{BAR_NAMES[number]}" (
+        bars.append(f"""    def Xform "{BAR_NAMES[number]}" (
         prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
     )
     {{
-        float physics:mass = {bar.mass!r}
+        float physics:mass = {mass!r}
         point3f physics:centerOfMass = {_write_tuple((centre.real, centre.imag, 0.0))}
-        float3 physics:diagonalInertia = ({", ".join([repr(inertia[number])] * 3)})
+        float3 physics:diagonalInertia = ({", ".join([repr(inertia)] * 3)})
         quatf physics:principalAxes = (1, 0, 0, 0)
         double3 xformOp:translate = {_write_tuple(place)}
         quatd xformOp:orient = {_write_tuple(plane.turn_on(turn[number]))}
@@ -332,7 +333,7 @@ def Xform "four_bar" (
     prepend apiSchemas = ["PhysicsArticulationRootAPI"]
 )
 {{
-{"".join([*bodies, *joints])}}}
+{"".join([*bars, *joints])}}}
 """
 
 

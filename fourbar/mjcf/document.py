@@ -4,7 +4,7 @@ import math
 import tomllib
 from dataclasses import dataclass, replace
 from importlib.resources import files
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, Self, get_args
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -146,8 +146,8 @@ def write_mjcf(
     else:
         couple = armature * scene.motion.alpha_2
         gain = 0.0
-        if armature and start is not None and scene.motion.alpha_2 == 0.0:
-            gain = armature / (SETTLING * model.timestep)
+        if armature and start is not None and not scene.motion.alpha_2:
+            gain = armature / (SETTLING * timestep)
             couple = gain * start.qvel[0]
         actuator = make_servo(couple, gain)
     model.add_actuators(actuator, driven=drive == "flywheel")
@@ -198,8 +198,8 @@ def _size_control(scene: Scene) -> float:
     sizes = np.abs(np.asarray(driving))
     largest = float(sizes[np.isfinite(sizes)].max(initial=0.0))
     if not largest:
-        inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
-        largest = inertia * _compute_acceleration_scale(scene)
+        scale = _Scale.of(scene)
+        largest = (scale.inertia + scale.of_loads) * scale.acceleration
     return float(f"{2.0 * largest:.3g}")
 
 
@@ -213,9 +213,8 @@ def _write_comments(
     """Say how the file starts and where its numbers stand, a line each."""
     notes = NOTES["mjcf"]
     numbers = NOTES["numbers"][reader]
-    bar = scene.drive_bar
     lines: list[str] = [
-        notes.get(f"{reader}_{kind}", notes[kind]).format(bar=bar)
+        notes.get(f"{reader}_{kind}", notes[kind]).format(bar=scene.drive_bar)
         for kind in ("opens", *_list_note_keys(scene, drive))
     ]
     lines += numbers["instant"]
@@ -261,8 +260,8 @@ def size_flywheel(scene: Scene, settings: Settings = RECIPE) -> float:
     work of weights and loads in a revolution is then a small part of the flywheel's
     energy.
     """
-    inertia = _sum_inertia(scene.linkage) + _sum_load_inertia(scene)
-    armature = settings.flywheel * inertia
+    scale = _Scale.of(scene)
+    armature = settings.flywheel * (scale.inertia + scale.of_loads)
     if not math.isfinite(armature):
         raise InputError(
             "flywheel",
@@ -278,10 +277,8 @@ def compute_load_ratio(scene: Scene) -> float:
 
     Symbols are those of `size_flywheel`.
     """
-    inertia = _sum_inertia(scene.linkage)
-    if inertia:
-        return _sum_load_inertia(scene) / inertia
-    return math.inf
+    scale = _Scale.of(scene)
+    return scale.of_loads / scale.inertia if scale.inertia else math.inf
 
 
 def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
@@ -290,7 +287,7 @@ def _leave_out_flywheel(scene: Scene, settings: Settings) -> Settings:
     The timestep follows from the speed that loads can cause; the closure of a released
     linkage takes little energy out.
     """
-    by_loads = compute_load_ratio(scene) * _compute_acceleration_scale(scene)
+    by_loads = compute_load_ratio(scene) * _Scale.of(scene).acceleration
     motion = scene.motion
     speed = math.sqrt((motion.omega_2 or 0.0) ** 2 + by_loads) or SPEED_LAID_OUT_FOR
     timestep = settings.timestep or math.tau / (_RELEASED_STEPS * speed)
@@ -312,8 +309,7 @@ def fit_pad(scene: Scene) -> float:
         * max(1.0, compute_mass_ratio(scene.linkage) / LIGHT_BAR_RATIO)
     )
     # size of the accelerations of bars 3 and 4
-    acceleration = _compute_acceleration_scale(scene) * a / max(b, c)
-    if acceleration < QUICK:
+    if _Scale.of(scene).acceleration * a / max(b, c) < QUICK:
         return least_sag
     return min(_STIFF_PAD, least_sag)
 
@@ -323,10 +319,8 @@ def compute_mass_ratio(linkage: FourBar) -> float:
 
     The ratio is 1 if one of them has no mass.
     """
-    masses = [reduce_mass(bar) for bar in (linkage.coupler, linkage.output)]
-    if min(masses) > 0.0:
-        return max(masses) / min(masses)
-    return 1.0
+    masses = [reduce_mass(bar) for bar in linkage.moving[1:]]
+    return max(masses) / min(masses) if min(masses) else 1.0
 
 
 def reduce_mass(bar: Bar) -> float:
@@ -334,39 +328,33 @@ def reduce_mass(bar: Bar) -> float:
     return (bar.moment_of_inertia + bar.mass * bar.mass_centre[0] ** 2) / bar.length**2
 
 
-def _compute_acceleration_scale(scene: Scene) -> float:
-    """Return the greater of omega_2^2 and |alpha_2|, rad/s^2.
+class _Scale(NamedTuple):
+    """Sizes that flywheel, timestep and closure are laid out for."""
 
-    The accelerations of all bars grow with it.
+    acceleration: float
+    """The greater of omega_2^2 and |alpha_2|, rad/s^2: all accelerations grow with it.
     """
-    motion = scene.motion
-    speed = motion.omega_2 or SPEED_LAID_OUT_FOR
-    return float(max(speed**2, abs(motion.alpha_2)))
+    inertia: float
+    """Sum of m L^2 + I of the moving bars, kg m^2."""
+    of_loads: float
+    """Sum of the couples of loads and effects on the drive over the acceleration."""
 
-
-def _sum_inertia(linkage: FourBar) -> float:
-    """Return the sum of m L^2 + I of the moving bars, kg m^2."""
-    longest = max(linkage.lengths)
-    inertia = 0.0
-    for bar in linkage.moving:
-        arm = max(longest, abs(bar.mass_centre[0]))
-        inertia += bar.mass * arm * arm + bar.moment_of_inertia
-    return inertia
-
-
-def _sum_load_inertia(scene: Scene) -> float:
-    """Sum the couples of loads and effects on the drive, as an inertia, kg m^2.
-
-    The sum is divided by the acceleration scale.
-    """
-    scene = scene.settled()
-    acceleration = _compute_acceleration_scale(scene)
-    speed = math.sqrt(acceleration)
-    couples = (
-        term.couple_on_drive(scene.linkage, speed)
-        for term in (*scene.loads, *scene.effects)
-    )
-    return sum(couples) / acceleration
+    @classmethod
+    def of(cls, scene: Scene) -> Self:
+        linkage = scene.linkage
+        motion = scene.motion
+        speed = motion.omega_2 or SPEED_LAID_OUT_FOR
+        acceleration = float(max(speed**2, abs(motion.alpha_2)))
+        longest = max(linkage.lengths)
+        inertia = 0.0
+        for bar in linkage.moving:
+            arm = max(longest, abs(bar.mass_centre[0]))
+            inertia += bar.mass * arm * arm + bar.moment_of_inertia
+        scene = scene.settled()
+        couples = 0.0
+        for term in (*scene.loads, *scene.effects):
+            couples += term.couple_on_drive(linkage, math.sqrt(acceleration))
+        return cls(acceleration, inertia, couples / acceleration)
 
 
 @dataclass
@@ -448,22 +436,22 @@ def find_start(scene: Scene) -> Start:
     at = Command(at.theta_2, at.branch, speed, alpha)
     solution = solve(scene, "velocity", at=at)
     usable = np.flatnonzero(solution.status_code == OK)
-    if not len(usable):
+    if not usable.size:
         raise NotAssembledError(
             "the linkage closes at none of the scene's positions: there is no keyframe"
             " to write"
         )
     theta_2 = at.theta_2[usable]
-    first = int(usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)])
-    columns = at.theta_2, solution.theta_3, solution.theta_4
-    theta = [float(column[first]) for column in columns]
-    omega = speed, float(solution.omega_3[first]), float(solution.omega_4[first])
+    first = usable[np.argmin(theta_2) if speed >= 0.0 else np.argmax(theta_2)]
+    q2 = float(at.theta_2[first])
+    q3 = float(solution.theta_3[first])
+    omega_3 = float(solution.omega_3[first])
     if np.ptp(theta_2) == 0.0:
-        theta_2 = theta[0] + np.array([0.0, _compute_span(scene.linkage)])
+        theta_2 = q2 + np.array([0.0, _compute_span(scene.linkage)])
         alpha = 0.0  # no window is requested: its length only sets the timestep
     return Start(
-        (theta[0], theta[1] - theta[0], theta[2]),
-        (omega[0], omega[1] - omega[0], omega[2]),
+        (q2, q3 - q2, float(solution.theta_4[first])),
+        (speed, omega_3 - speed, float(solution.omega_4[first])),
         choose_run(theta_2, speed or SPEED_LAID_OUT_FOR, alpha if speed else 0.0),
     )
 
@@ -509,10 +497,8 @@ def write_mjcf_for(
     Raises InputError for no such simulator, or a motor for one that does not take it,
     and as `write_mjcf` does.
     """
-    given = {"simulator": simulator, "drive": drive}
-    for (name, word), words in zip(
-        given.items(), (SIMULATORS, get_args(Drive)), strict=True
-    ):
+    stated = ("simulator", simulator, SIMULATORS), ("drive", drive, get_args(Drive))
+    for name, word, words in stated:
         if word not in words:
             raise InputError(name, word, f"must be one of {', '.join(words)}")
     if drive == "motor" and simulator in _OWN_MOTORS:

@@ -193,29 +193,32 @@ def require_carriable(linkage: FourBar) -> None:
     if heaviest:
         enough = max(_A_MILLIONTH * heaviest, 2.0 * LEAST_MASS)
         part = "a millionth of the heaviest bar's"
+    least = write_in_units("m", LEAST_LENGTH)
+    too_short = (
+        f"must be at least {least}: the compiler of MuJoCo takes a nearer site for its"
+        " body's origin"
+    )
+    mass = write_in_units("kg", float(f"{enough:.2g}"))
+    too_light = (
+        f'MuJoCo cannot carry a massless bar; with mass = "{mass}" ({part}) and no'
+        " inertia stated the simulation holds, and hardly a force moves"
+    )
     for number in MOVING_BARS:
         bar = linkage.bar(number)
-        if bar.length < LEAST_LENGTH:
-            least = write_in_units("m", LEAST_LENGTH)
-            allowed = (
-                f"must be at least {least}: the compiler of MuJoCo takes a nearer site"
-                " for its body's origin"
-            )
-            name = f"lengths.{BAR_NAMES[number]}"
-            raise InputError(name, bar.length, allowed, unit="m")
-        for key, value, unit in (
-            ("mass", bar.mass, "kg"),
-            ("inertia", bar.moment_of_inertia, "kg m^2"),
+        name = BAR_NAMES[number]
+        for key, value, unit, smallest, allowed in (
+            (f"lengths.{name}", bar.length, "m", LEAST_LENGTH, too_short),
+            (f"bars.{name}.mass", bar.mass, "kg", LEAST_MASS, too_light),
+            (
+                f"bars.{name}.inertia",
+                bar.moment_of_inertia,
+                "kg m^2",
+                LEAST_MASS,
+                too_light,
+            ),
         ):
-            if value < LEAST_MASS:
-                mass = write_in_units("kg", float(f"{enough:.2g}"))
-                instead = f'mass = "{mass}" ({part}) and no inertia stated'
-                allowed = (
-                    "MuJoCo cannot carry a massless bar; "
-                    f"with {instead} the simulation holds, and hardly a force moves"
-                )
-                name = f"bars.{BAR_NAMES[number]}.{key}"
-                raise InputError(name, value, allowed, unit=unit)
+            if value < smallest:
+                raise InputError(key, value, allowed, unit=unit)
 
 
 class Model:

@@ -39,6 +39,11 @@ class Quantity(NamedTuple):
     friction that depends on the pin forces, a drive that exerts a force.
     """
 
+    @property
+    def stage_number(self) -> int:
+        """Return the index of the stage in `STAGES`; 0 if it is commanded."""
+        return STAGES.index(self.stage or STAGES[0])
+
 
 def _scalar(*line: str | None) -> Any:
     """Declare a number at each position: unit, stage, meaning and group."""
@@ -234,6 +239,7 @@ QUANTITIES = tuple(
     Quantity(declared.name, *declared.metadata["line"])
     for declared in fields(Quantities)
 )
+_QUANTITY_OF = {q.name: q for q in QUANTITIES}
 UNITS = {q.name: q.unit for q in QUANTITIES}
 STAGE_OF = {q.name: q.stage for q in QUANTITIES if q.stage is not None}
 """Every evaluated quantity and the stage that computes it."""
@@ -290,6 +296,23 @@ def find_derived(name: str) -> Quantity | None:
     if of_spring is None:
         return DERIVED_NAMES.get(name)
     return next(q for q in SPRING_QUANTITIES if q.name == of_spring[2])
+
+
+OF_POINTS = {
+    start: Quantity("", "vector", unit, stage, f"{stage} of a point of the scene")
+    for start, unit, stage in (
+        ("", "m", "position"),
+        ("v_", "m/s", "velocity"),
+        ("a_", "m/s^2", "acceleration"),
+    )
+}
+"""Quantities of a point of the scene, by the start of the name."""
+
+
+def find_quantity(name: str) -> Quantity:
+    """Return a quantity by its name, which may be derived or that of a point."""
+    of_point = OF_POINTS.get(name[:2], OF_POINTS[""])
+    return _QUANTITY_OF.get(name) or find_derived(name) or of_point
 
 
 class DriveNames(NamedTuple):

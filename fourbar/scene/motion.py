@@ -513,18 +513,17 @@ class Motion(Described):
 
     def _check(self, names: tuple[str, str, str]) -> tuple[Any, Any, Any]:
         """Return the numbers of the command of these names, checked."""
-        units = [Motion.numbers[name].unit for name in names]
-        theta, omega, alpha = (f"motion.{name}" for name in names)
         angle, speed, acceleration = (getattr(self, name) for name in names)
-        angle = _require_places(theta, angle, units[0])
+        angle = _require_places(names[0], angle)
         if speed is not None:
-            speed = _require_rates(omega, speed, units[1], angle)
+            speed = _require_rates(names[1], speed, angle)
             highest = float(np.max(np.abs(speed)))
             if not math.isfinite(highest * highest):
-                fastest = write_in_units(units[1], LARGEST_SPEED)
+                unit = Motion.numbers[names[1]].unit
+                fastest = write_in_units(unit, LARGEST_SPEED)
                 allowed = f"must be below {fastest}: every acceleration has its square"
-                raise InputError(omega, highest, allowed, unit=units[1])
-        return angle, speed, _require_rates(alpha, acceleration, units[2], angle)
+                raise InputError(f"motion.{names[1]}", highest, allowed, unit=unit)
+        return angle, speed, _require_rates(names[2], acceleration, angle)
 
     @property
     def commanded(self) -> str:
@@ -601,8 +600,10 @@ class Motion(Described):
         return speed, acceleration
 
 
-def _require_places(key: str, stated: Any, unit: str) -> Any:
+def _require_places(name: str, stated: Any) -> Any:
     """Return commanded angles, or strokes above 0, checked."""
+    key = f"motion.{name}"
+    unit = Motion.numbers[name].unit
     if stated is None or (isinstance(stated, FromLimit) and unit == "rad"):
         return stated
     if isinstance(stated, Sweep):
@@ -624,9 +625,10 @@ def _require_places(key: str, stated: Any, unit: str) -> Any:
     return stated
 
 
-def _require_rates(key: str, rates: Any, unit: str, angle: Any) -> float | Array:
+def _require_rates(name: str, rates: Any, angle: Any) -> float | Array:
     """Return one rate, or an array of one for each angle, checked."""
-    array = require_numbers(key, rates, unit=unit)
+    key = f"motion.{name}"
+    array = require_numbers(key, rates, unit=Motion.numbers[name].unit)
     if array.ndim == 0:
         return float(array)
     listed = len(angle) if isinstance(angle, np.ndarray) else 0

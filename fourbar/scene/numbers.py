@@ -4,6 +4,7 @@ Units are declared where the numbers belong.
 """
 
 import math
+import re
 from typing import Annotated, Any
 
 from fourbar import effects
@@ -33,9 +34,7 @@ from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
 from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import Motion
 
-LONGEST_POINT_NAME = 40
-POINT_STAGES = {"": "position", "v_": "velocity", "a_": "acceleration"}
-"""Quantities evaluated for a point: the prefix of the name and the stage."""
+_POINT_NAME = re.compile("(?!v_|a_)[a-z_][a-z_0-9]{,39}", re.IGNORECASE | re.ASCII)
 
 
 @record
@@ -58,16 +57,7 @@ class Point(Placed):
     stated_at = "points.{0.name}"
 
     def __post_init__(self) -> None:
-        plain = (
-            isinstance(self.name, str)
-            and self.name.isascii()
-            and self.name.isidentifier()
-        )
-        if (
-            not plain
-            or self.name.startswith(("v_", "a_"))
-            or len(self.name) > LONGEST_POINT_NAME
-        ):
+        if not (isinstance(self.name, str) and _POINT_NAME.fullmatch(self.name)):
             allowed = (
                 "must be a word of letters, digits and _, not beginning with a digit,"
                 " v_ or a_"

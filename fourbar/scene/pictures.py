@@ -119,14 +119,7 @@ class TracedPicture(_PictureFile, Described):
 
     def read(self) -> tuple[bytes, str]:
         """Return the content of the file and its type, as a browser names it."""
-        file = self.find_file()
-        content = read_bytes(file, self.key, LARGEST_PICTURE, shown=self.name)
-        kind = find_kind(content)
-        if kind is None and b"<svg" in content[:LONGEST_SVG_HEAD]:
-            kind = "image/svg+xml"
-        if kind is None:
-            raise InputError(self.key, self.name, "must be a PNG, JPEG or SVG picture")
-        return content, kind
+        return read_picture(self.key, self.find_file(), self.name, "PNG, JPEG or SVG")
 
 
 @record
@@ -165,23 +158,23 @@ class Picture(_PictureFile):
         return encode_picture(self.key, self.find_file(), self.name)
 
 
-def find_kind(content: bytes) -> str | None:
-    """Return the type of a PNG or JPEG by its first bytes; None for any other."""
+def read_picture(
+    key: str, path: str | Path, shown: str, allowed: str = "PNG or JPEG"
+) -> tuple[bytes, str]:
+    """Return the content of a picture and its type, as a browser names it.
+
+    Raises InputError, in one line, as `read_bytes` does, and for another type.
+    """
+    content = read_bytes(path, key, LARGEST_PICTURE, shown=shown)
     for magic, kind in _RASTER.items():
         if content.startswith(magic):
-            return kind
-    return None
+            return content, kind
+    if "SVG" in allowed and b"<svg" in content[:LONGEST_SVG_HEAD]:
+        return content, "image/svg+xml"
+    raise InputError(key, shown, f"must be a {allowed} picture")
 
 
 def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:
-    """Encode a PNG or JPEG file as a data URI.
-
-    Raises InputError, in one line, as `read_bytes` does, and for a file that begins as
-    neither.
-    """
-    name = str(path) if shown is None else shown
-    content = read_bytes(path, key, LARGEST_PICTURE, shown=name)
-    kind = find_kind(content)
-    if kind is None:
-        raise InputError(key, name, "must be a PNG or JPEG picture")
+    """Encode a PNG or JPEG file as a data URI; InputError as `read_picture` raises."""
+    content, kind = read_picture(key, path, shown or str(path))
     return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

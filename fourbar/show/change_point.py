@@ -10,8 +10,7 @@ import numpy as np
 from fourbar.errors import InputError
 from fourbar.evaluation.free_motion import release_at
 from fourbar.quantities import CHANGE_POINT, PIN_FORCES, Array
-from fourbar.scene import Command, Scene, command_at
-from fourbar.scene.scene import compute_bar_motion
+from fourbar.scene import Command, Scene, command_at, compute_bar_motion
 from fourbar.solution import Solution
 from fourbar.solving import solve
 

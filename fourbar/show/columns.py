@@ -19,8 +19,7 @@ from fourbar.errors import (
     names_other_mechanism,
 )
 from fourbar.quantities import STAGE_OF, Array, find_derived
-from fourbar.scene import Scene, command_at
-from fourbar.scene.scene import LimitOrigin
+from fourbar.scene import LimitOrigin, Scene, command_at
 from fourbar.show.derived import derive, list_derived_names
 from fourbar.solution import (
     Conversion,

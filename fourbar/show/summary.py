@@ -13,8 +13,8 @@ import numpy as np
 from fourbar.formulas.mobility import choose_range
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK, Array
+from fourbar.scene import find_stroke_ranges
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.scene.scene import find_stroke_ranges
 from fourbar.show.driving import (
     is_once_round,
     leaves_range,

@@ -6,9 +6,8 @@ import numpy as np
 
 from fourbar.formulas.mobility import TURN
 from fourbar.quantities import ANGLES, Array, Indices, Mask
-from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene import Command, Scene, command, command_at, default_places
 from fourbar.scene.motion import Motion, Sweep
-from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
 

@@ -27,6 +27,7 @@ from fourbar.quantities import (
     DRY_FRICTION_QUANTITIES,
     FORCE_NAMES,
     NOT_ASSEMBLED,
+    OF_POINTS,
     OK,
     PIN_FORCES,
     SINGULAR,
@@ -37,10 +38,8 @@ from fourbar.quantities import (
     Indices,
     Mask,
 )
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, compute_bar_motion
 from fourbar.scene.motion import FromLimit
-from fourbar.scene.numbers import POINT_STAGES
-from fourbar.scene.scene import compute_bar_motion
 from fourbar.solution import (
     SHOWN_PARTS,
     Solution,
@@ -312,7 +311,7 @@ def sensitivity(scene: Scene) -> Sensitivity:
         or (moving and name in forces)
         or (name == "theta_2" and scene.motion.commanded != name)
     ]
-    stages = POINT_STAGES if moving else ("",)
+    stages = OF_POINTS if moving else ("",)
     names += [start + point.name for point in scene.points for start in stages]
     p = len(keys)
     by = {
@@ -423,16 +422,16 @@ def _derive(
         for term in case.terms:
             if isinstance(term, Springs):
                 off |= term.comes_off(state)
-        dynamics = case.dynamics(state, acceleration)
+        dynamics = case.dynamics(state)
         quantities |= dynamics.pins._asdict()
-        quantities[case.drive_names.value] = dynamics.effort
+        quantities[case.drive.names.value] = dynamics.effort
         quantities["power"] = dynamics.generalized_force * speed
         quantities["drive_condition"] = case.drive_condition(state)
-        low, high = case.drive_names.low, case.drive_names.high
+        low, high = case.drive.names.low, case.drive.names.high
         if low in by:
             still = state._replace(speed=0.0)
-            ahead = case.dynamics(still, acceleration, 1).effort
-            back = case.dynamics(still, acceleration, -1).effort
+            ahead = case._replace(impending=1).dynamics(still).effort
+            back = case._replace(impending=-1).dynamics(still).effort
             falls = take_values(back) < take_values(ahead)
             quantities[low] = select(falls, back, ahead)
             quantities[high] = select(falls, ahead, back)

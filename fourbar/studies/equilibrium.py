@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fourbar.errors import expect
+from fourbar.evaluation.case import Couple
 from fourbar.formulas.mobility import TURN
 from fourbar.formulas.motion import Coefficients
 from fourbar.formulas.position import Loop
@@ -36,9 +37,8 @@ from fourbar.quantities import (
     Mask,
     Signs,
 )
-from fourbar.scene import Command, Scene
+from fourbar.scene import Command, Scene, default_places
 from fourbar.scene.motion import Motion
-from fourbar.scene.scene import default_places
 from fourbar.solution import Solution
 from fourbar.solving import solve
 from fourbar.studies.circuit_curve import (
@@ -396,8 +396,8 @@ def _add_friction(curve: CircuitCurve, points: Array, impending: int) -> Array:
     for bar, chosen in ((2, along), (4, ~along)):
         if chosen.any():
             part = curve.state(points[chosen])
-            case = curve.case._replace(drive_bar=bar, drive=None)
-            dynamics = case.dynamics(part, 0.0, impending)
+            case = curve.case._replace(drive=Couple(bar), impending=impending)
+            dynamics = case.dynamics(part)
             Q = -dynamics.effort * part.k[bar - 2]
             is_jammed = dynamics.status == JAMMED
             force[chosen] = np.where(is_jammed, -impending * np.inf, Q)

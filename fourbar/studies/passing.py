@@ -10,9 +10,8 @@ import numpy as np
 from fourbar.errors import NotAssembledError, write_in_units
 from fourbar.formulas.mobility import TURN, find_intervals, turns_fully
 from fourbar.linkage import FourBar
-from fourbar.scene import Command, Scene, command, command_at
+from fourbar.scene import Command, Scene, command, command_at, default_places, say_range
 from fourbar.scene.motion import COMMAND_NAMES, STROKE_COMMAND, Sweep
-from fourbar.scene.scene import default_places, say_range
 from fourbar.solving import solve
 
 COMMANDED_ANGLES = tuple(names[0] for names in COMMAND_NAMES.values())

@@ -10,10 +10,9 @@ from fourbar.errors import InputError, expect
 from fourbar.evaluation.case import Case
 from fourbar.linkage import BAR_NAMES, convert_to_unit
 from fourbar.quantities import INVALID, NOT_ASSEMBLED, Array, Mask
-from fourbar.scene import Command, Scene, command
+from fourbar.scene import Command, Scene, command, command_stroke
 from fourbar.scene.motion import FromLimit
 from fourbar.scene.numbers import find_unit_of_key
-from fourbar.scene.scene import command_stroke
 from fourbar.solution import Solution
 from fourbar.solving import Results, make_solution, split
 from fourbar.studies.keys import (

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 import fourbar
-from fourbar.quantities import FORCE_NAMES, LINE, UNKNOWNS, Array
-from fourbar.scene.numbers import POINT_STAGES
+from fourbar.quantities import FORCE_NAMES, LINE, OF_POINTS, UNKNOWNS, Array
 from fourbar.studies.keys import command_key
 from fourbar_validation.compare.rows import keep_worst
 from fourbar_validation.compare.scales import make_reference
@@ -202,7 +201,7 @@ def _place_points(scene, answer, drawing):
     origin = complex(*drawing.O2) if drawing else 0j
     placed = {}
     for name, moved in move_points(scene, make_reference(scene, answer)).items():
-        parts = zip(POINT_STAGES, *moved, (origin, 0j, 0j), strict=True)
+        parts = zip(OF_POINTS, *moved, (origin, 0j, 0j), strict=True)
         for start, arm, foot, shift in parts:
             vector = arm + foot + shift
             placed[f"{start}{name}"] = np.stack((vector.real, vector.imag), axis=1)

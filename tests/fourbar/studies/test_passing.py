@@ -31,8 +31,7 @@ from fourbar.errors import (
 )
 from fourbar.files import loads
 from fourbar.formulas.mobility import find_intervals
-from fourbar.scene import command_at
-from fourbar.scene.scene import say_range
+from fourbar.scene import command_at, say_range
 from fourbar.show.located import locate
 from fourbar.studies.passing import (
     INSIDE_LIMIT,

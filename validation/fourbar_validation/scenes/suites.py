@@ -16,9 +16,8 @@ from fourbar import writing
 from fourbar.errors import InputError, state_messages_in
 from fourbar.files import parse_tables, read_scene_text, read_tables
 from fourbar.linkage import record
-from fourbar.scene import Scene
+from fourbar.scene import Scene, default_places
 from fourbar.scene.motion import Free, Law, Rise, Sine, Sweep, require_steps
-from fourbar.scene.scene import default_places
 from fourbar.show.shown_units import units_of_scene
 from fourbar_validation.compare.rows import escape_controls
 from fourbar_validation.places import MODELS
