@@ -264,14 +264,17 @@ class Solution(Quantities):  # noqa: PLW1641 - arrays have no hash
 
         Raises DependencyError where pandas is not installed.
         """
-        evaluated = {
-            heading: column
-            for heading, column in _list_scalars(self, require_units(units)).items()
-            if column[1] is not None
-        }
-        columns = {heading: values for heading, (_, values) in evaluated.items()}
-        table = make_data_frame(_list_leading(self) | columns)
-        table.attrs["units"] = {name: unit for name, (unit, _) in evaluated.items()}
+        columns = {}
+        units_of = {}
+        for heading, (unit, values) in _list_columns(
+            self, require_units(units)
+        ).items():
+            if values is not None:
+                columns[heading] = values
+            if values is not None and unit:
+                units_of[heading] = unit
+        table = make_data_frame(columns)
+        table.attrs["units"] = units_of
         return table
 
 
@@ -339,67 +342,56 @@ def write_csv(
 
     `chosen`: the columns by heading, in these units; without any: all quantities.
     """
-    scalars: Mapping[str, Array | None] = chosen or {}
-    columns: dict[str, Iterable[Any]] = {}
-    if not chosen:
-        of_all = _list_scalars(solution, units)
-        scalars = {heading: values for heading, (_, values) in of_all.items()}
-        columns |= _list_leading(solution)
+    columns: Mapping[str, Any] = chosen or {
+        heading: values
+        for heading, (_, values) in _list_columns(solution, units).items()
+    }
 
     def write_cell(number: float) -> str:
         return repr(number).replace(".", decimal) if math.isfinite(number) else ""
 
-    nothing = [math.nan] * solution.theta_2.size
-    for heading, values in scalars.items():
-        columns[heading] = map(
-            write_cell, nothing if values is None else values.tolist()
-        )
+    def write_cells(values: Any) -> Iterable[Any]:
+        if isinstance(values, np.ndarray):
+            return map(write_cell, values.tolist())
+        return values or [""] * solution.theta_2.size
+
     text = io.StringIO()
     delimiter = ";" if decimal == "," else ","
     writer = csv.writer(text, lineterminator="\n", delimiter=delimiter)
     writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
+    writer.writerows(zip(*map(write_cells, columns.values()), strict=True))
     return text.getvalue()
 
 
-def _list_leading(solution: Solution) -> dict[str, Any]:
-    """List the first columns of a table, one entry for each position.
+def _list_columns(
+    solution: Solution, units: Conversion
+) -> dict[str, tuple[str, Array | list[Any] | None]]:
+    """List the columns of a table, one entry for each position, by their headings.
 
-    The table of a study begins with the number of the member.
+    The table of a study begins with the number of the member; members follow in turn.
+    Every quantity is a column of numbers, vectors are `A_x`, `A_y`, magnitudes of pin
+    forces are included, and the time where it is known. A heading in other units than
+    SI names its own ("F12_x [lbf]"). A column has its unit, empty for words, and None
+    for what was not evaluated.
     """
     size = solution.theta_2.size
-    members = {}
+    columns = dict[str, tuple[str, Array | list[Any] | None]]()
     if solution.theta_2.ndim > 1:
         count = len(solution)
-        members["member"] = np.repeat(np.arange(count), size // count).tolist()
-    return {
-        **members,
-        "status": np.array(STATUS_NAMES)[solution.status_code.ravel()].tolist(),
-        "branch": np.ravel(solution.branch).tolist(),
-        "drive_bar": [solution.drive_bar] * size,
-    }
-
-
-def _list_scalars(
-    solution: Solution, units: Conversion
-) -> dict[str, tuple[str, Array | None]]:
-    """List every quantity as columns of numbers, vectors as `A_x`, `A_y`.
-
-    Magnitudes of pin forces are included, and the time where it is known. Under each
-    heading, which in other units than SI names its own ("F12_x [lbf]"), are the unit
-    and the value at each position; None for what was not evaluated.
-    """
+        columns["member"] = "", np.repeat(np.arange(count), size // count).tolist()
+    statuses = np.array(STATUS_NAMES)[solution.status_code.ravel()]
+    columns["status"] = "", statuses.tolist()
+    columns["branch"] = "", np.ravel(solution.branch).tolist()
+    columns["drive_bar"] = "", [solution.drive_bar] * size
     quantities = {
         name: find_values(solution, name, units) for name in _list_quantities(solution)
     }
     quantities |= load_show("derived").list_derived(solution, units)
-    columns = dict[str, tuple[str, Array | None]]()
     for name, values in quantities.items():
         unit, _ = find_unit_in(find_unit_of_quantity(name), units)
         named = f" [{unit}]" if units and unit != "1" else ""
         parts = split_parts(name, np.empty((1, 2)) if values is None else values)
         for part in sorted(parts, key=lambda part: part[0] == "|"):  # sizes come last
-            # members in turn
             flat = None if values is None else parts[part].ravel()
             columns[f"{part}{named}"] = unit, flat
     time = compute_times(solution.scene, solution.at)

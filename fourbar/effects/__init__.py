@@ -11,22 +11,36 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fourbar.effects.effect import Actions as Actions
-    from fourbar.effects.effect import Effect as Effect
-    from fourbar.effects.flywheel import Flywheel as Flywheel
-    from fourbar.effects.force_drive import ForceDrive as ForceDrive
-    from fourbar.effects.force_drive import LinearDrive as LinearDrive
-    from fourbar.effects.force_drive import PointDrive as PointDrive
-    from fourbar.effects.friction import Friction as Friction
-    from fourbar.effects.gravity import Gravity as Gravity
-    from fourbar.effects.load import Load as Load
-    from fourbar.effects.load import Table as Table
-    from fourbar.effects.pin_friction import PinFriction as PinFriction
-    from fourbar.effects.place import Place as Place
-    from fourbar.effects.spring import Spring as Spring
-    from fourbar.effects.spring import Springs as Springs
-    from fourbar.effects.torsion import Torsion as Torsion
-    from fourbar.effects.viscous import Viscous as Viscous
+    from fourbar.effects.effect import Actions, Effect
+    from fourbar.effects.flywheel import Flywheel
+    from fourbar.effects.force_drive import ForceDrive, LinearDrive, PointDrive
+    from fourbar.effects.friction import Friction
+    from fourbar.effects.gravity import Gravity
+    from fourbar.effects.load import Load, Table
+    from fourbar.effects.pin_friction import PinFriction
+    from fourbar.effects.place import Place
+    from fourbar.effects.spring import Spring, Springs
+    from fourbar.effects.torsion import Torsion
+    from fourbar.effects.viscous import Viscous
+
+__all__ = (
+    "Actions",
+    "Effect",
+    "Flywheel",
+    "ForceDrive",
+    "Friction",
+    "Gravity",
+    "LinearDrive",
+    "Load",
+    "PinFriction",
+    "Place",
+    "PointDrive",
+    "Spring",
+    "Springs",
+    "Table",
+    "Torsion",
+    "Viscous",
+)
 
 FIRST_FILES = (
     "gravity",

@@ -133,8 +133,6 @@ class Actions:
 
     def couple(self, bar: int, moment: Number) -> None:
         """Add a pure couple on a bar, N m; on the ground it does nothing."""
-        if bar == 1:
-            return
         self.moment_about_pin(bar, moment)
         if bar == 3:
             self.on_coupler.append((None, 0.0j, None, moment))

@@ -24,10 +24,6 @@ from fourbar.formulas.pin_forces import PinForces
 from fourbar.linkage import AT_LEAST_ZERO, PIN_FORCE, Declared, record
 from fourbar.quantities import JAMMED, OK, SEVERAL, Array, Codes, Mask
 
-ONE_SOLUTION, NO_SOLUTION, MANY = range(3)
-"""Number of solutions of the friction equations."""
-STATUS_OF_NUMBER = np.array([OK, JAMMED, SEVERAL], dtype=np.uint8)
-"""Status of a position by the number of solutions."""
 NEWTON_STEPS = 60
 """Steps after which an iteration that goes on does not converge; most take five."""
 SETTLED = 32.0 * 2.0**-52
@@ -136,7 +132,7 @@ class PinFriction(PinRows):
             loaded,
             find_least_stretch(sliding.slope).reshape(shape),
             np.max(residuals, axis=0),
-            STATUS_OF_NUMBER[sliding.number].reshape(shape),
+            sliding.status.reshape(shape),
         )
 
     def act_known(self, actions: Actions, forces: Mapping[str, Array]) -> None:
@@ -226,8 +222,8 @@ class _Sliding(NamedTuple):
 
     x: Array
     """(n, p), N m; the only or the least solution, NaN where there is none."""
-    number: Codes
-    """(n,), ONE_SOLUTION, NO_SOLUTION or MANY."""
+    status: Codes
+    """(n,), OK if there is one solution, JAMMED if none, SEVERAL if more."""
     slope: Array
     """(n, p, p), slope of k |F + C x| at the solution."""
 
@@ -240,24 +236,24 @@ def solve_sliding(F: Array, C: Array, k: Array) -> _Sliding:
     problems = _Problems(F, C, k)
     p = k.shape[1]
     x = np.full(k.shape, np.nan)
-    number = np.full(len(k), ONE_SOLUTION, dtype=np.uint8)
+    status = np.full(len(k), OK, dtype=np.uint8)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         K = k[:, :, None] * np.abs(C)
         finite = np.isfinite(F).all(axis=1) & np.isfinite(K).all(axis=(1, 2))
         rows = np.flatnonzero(finite)
         radius = np.abs(np.linalg.eigvals(K[rows])).max(axis=1)
         contract = rows[radius < 1.0]
-        x[contract], number[contract] = _search(
+        x[contract], status[contract] = _search(
             problems.part(contract), np.zeros((1, p))
         )
-        searched = np.setdiff1d(rows, contract[number[contract] == ONE_SOLUTION])
+        searched = np.setdiff1d(rows, contract[status[contract] == OK])
         starts = _list_starts(p)
         for block in np.array_split(
             searched, 1 + searched.size * len(starts) // STARTS_AT_ONCE
         ):
-            x[block], number[block] = _search(problems.part(block), starts)
+            x[block], status[block] = _search(problems.part(block), starts)
         _, slope = problems.right_side(x)
-    return _Sliding(x, number, slope)
+    return _Sliding(x, status, slope)
 
 
 def find_least_stretch(slope: Array) -> Array:
@@ -274,7 +270,7 @@ def find_least_stretch(slope: Array) -> Array:
 
 
 def _search(problems: _Problems, starts: Array) -> tuple[Array, Codes]:
-    """Find the least solution of each problem, and how many there are.
+    """Find the least solution of each problem, and the status by how many there are.
 
     `starts`: (s, p), over the size of the couples.
     """
@@ -292,11 +288,11 @@ def _search(problems: _Problems, starts: Array) -> tuple[Array, Codes]:
     distance = np.abs(x - least[:, None]).max(axis=2)
     larger = np.maximum(x.max(axis=2), least.max(axis=1)[:, None])
     others = solves & (distance > SAME_SOLUTION * larger)
-    number = np.full(n, NO_SOLUTION, dtype=np.uint8)
-    number[solves.any(axis=1)] = ONE_SOLUTION
-    number[others.any(axis=1)] = MANY
-    least[number == NO_SOLUTION] = np.nan
-    return least, number
+    status = np.full(n, JAMMED, dtype=np.uint8)
+    status[solves.any(axis=1)] = OK
+    status[others.any(axis=1)] = SEVERAL
+    least[status == JAMMED] = np.nan
+    return least, status
 
 
 def _list_starts(p: int) -> Array:

@@ -86,10 +86,6 @@ class Place(NamedTuple):
             return self
         return self._replace(from_pin=linkage.bar(self.bar).mass_centre)
 
-    def in_one_pair(self) -> "Place":
-        """Return a settled place as one pair from the bar's first pin."""
-        return Place(self.bar, self.polar_from_pin())
-
     def vector(self) -> Any:
         """Compute the vector to a settled place, complex, m, in the bar's frame.
 

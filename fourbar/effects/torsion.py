@@ -9,8 +9,7 @@ from fourbar.effects.effect import Actions, Joints, PinRows
 from fourbar.errors import LimitError
 from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
-from fourbar.formulas.path import ROLES_OF_BARS
-from fourbar.formulas.position import reorder_lengths
+from fourbar.formulas.position import ROLES_OF_BARS, reorder_lengths
 from fourbar.linkage import PINS, POSITIVE, Declared, FourBar, copy_with, record
 from fourbar.quantities import WOUND, Array, Codes, Signs
 

@@ -44,7 +44,6 @@ LARGEST_PERTURBATION = 1e-3
 """Part of the sum of the lengths: a member of a study that misses a change point of the
 nominal linkage by more is a linkage of its own.
 """
-_NO_POSITIONS = np.empty(0, dtype=np.intp)
 _NO_MOTION = Coefficients(*[np.nan] * 8)
 """Coefficients of NaN, used where only positions are evaluated."""
 
@@ -294,20 +293,12 @@ class Case(NamedTuple):
                 if is_any(constant < 0.0):
                     close = close | ((constant < 0.0) & (abs(factor) < small))
         if not is_any(close):
-            return half, _NO_POSITIONS
+            return half, np.empty(0, dtype=np.intp)
         from fourbar.formulas.many_digits import decide_half_angles
 
         index = np.flatnonzero(np.broadcast_to(close, np.shape(q)))
-        half = decide_half_angles(
-            self.linkage,
-            self.path.unit,
-            half,
-            index,
-            q,
-            remainder,
-            self.path.bar,
-        )
-        return half, index
+        decided = decide_half_angles(self.linkage, self.path, half, index, q, remainder)
+        return decided, index
 
     def _compute_inertial_forces(self, state: State, sine: Any) -> "_InertialForces":
         """Compute d'Alembert's forces and moments, and their generalized force.

@@ -226,12 +226,11 @@ def _list_error_bars(
 
         half = decide_half_angles(
             case.linkage,
-            case.path.unit,
+            case.path,
             half,
             refined_rows,
             state.q,
             remainder,
-            case.path.bar,
             lost[..., 0] if remainder is None else 0.0,
         )
     motion = command._replace(angle=q, speed=speed, acceleration=acceleration)

@@ -40,10 +40,6 @@ from fourbar.scene import Command, ReleaseOrigin, Scene, command, say_range
 RELATIVE, ABSOLUTE = 3e-15, 3e-15
 """Tolerances of a step of DOP853. Below them a long fast motion errs by its round-off.
 """
-_SCIPY_LEAST = 100.0 * 2.0**-52
-"""Least relative tolerance that SciPy's constructor takes without a warning. The solver
-works with a smaller one.
-"""
 _CHANGE_OVER = 0.5
 """Part of the other angle's sine below which the angle is changed."""
 _LONGEST_TURN = 1.0
@@ -361,7 +357,8 @@ class _Run:
             """SciPy's, with a smaller tolerance and a largest number of steps."""
 
             def __init__(self, *arguments: Any, **options: Any) -> None:
-                super().__init__(*arguments, rtol=_SCIPY_LEAST, **options)
+                # SciPy's constructor warns of a smaller tolerance
+                super().__init__(*arguments, rtol=100.0 * 2.0**-52, **options)
                 self.rtol = RELATIVE
 
             def step(self) -> Any:

@@ -73,16 +73,12 @@ def change_numbers(value: Any, change: Callable[[Any], Any]) -> Any:
         if hasattr(value, "_fields"):
             return type(value)(*parts)
         return tuple(parts)
-    if not _has_numbers(value.__class__):
+    kind: Any = value.__class__
+    if not is_dataclass(kind) or getattr(kind, "as_given", False):
         return value
     names = list_fields(value.__class__)
     changed = {name: change_numbers(getattr(value, name), change) for name in names}
     return copy_with(value, **changed)
-
-
-def _has_numbers(kind: type) -> bool:
-    """Return True for a dataclass whose numbers may be changed."""
-    return is_dataclass(kind) and not getattr(kind, "as_given", False)
 
 
 class Pair(OfParts):

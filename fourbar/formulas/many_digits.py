@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fourbar.formulas.arithmetic import make_like
+from fourbar.formulas.path import LoopPath
 from fourbar.formulas.position import (
     TOUCHING,
     HalfAngle,
@@ -26,11 +27,10 @@ _RESIDUE = 1e-55
 
 def exact_half_angle(
     linkage: FourBar,
+    path: LoopPath,
     theta_2: float,
     remainder: Any,
-    unit: Any = 1.0,
     member: int = 0,
-    bar: int = 2,
     lost: float = 0.0,
 ) -> HalfAngle:
     """Compute the half angle of `formulas.position.half_angle` in numbers of mpmath.
@@ -39,13 +39,12 @@ def exact_half_angle(
 
     Parameters
     ----------
+    path : loop as it is read, with the unit of its lengths; theta_2 is its angle.
     theta_2 : rad.
     remainder : what theta_2 as a double leaves out of the angle meant (rad, mpmath),
         where that is known (`Command.remainder`). A position beyond the limit then does
         not assemble, however near.
-    unit : of the lengths, m.
     member : row of numbers of the linkage that are arrays, (m, 1).
-    bar : from which the loop is read; theta_2 is its angle.
     lost : what a theta_2 that was computed leaves out as a double, rad.
     """
     from mpmath import mp, mpf
@@ -55,7 +54,8 @@ def exact_half_angle(
 
     with mp.workdps(WORKING_DIGITS):
         d, a, b, c = (
-            own(length) / own(unit) for length in reorder_lengths(bar, linkage.lengths)
+            own(length) / own(path.unit)
+            for length in reorder_lengths(path.bar, linkage.lengths)
         )
         h = (
             mpf(theta_2)
@@ -63,7 +63,7 @@ def exact_half_angle(
             - own(linkage.ground_angle)
             + (0 if remainder is None else remainder)
         ) / 2
-        if bar == 4:
+        if path.bar == 4:
             h -= mp.pi / 2
         s = mp.sin(h)
         k = mp.cos(h)
@@ -80,12 +80,11 @@ def exact_half_angle(
 
 def decide_half_angles(
     linkage: FourBar,
-    unit: float,
+    path: LoopPath,
     half: HalfAngle,
     index: Any,
     theta_2: Any,
     remainder: Any = None,
-    bar: int = 2,
     lost: Any = 0.0,
 ) -> HalfAngle:
     """Return the half angles with those at an index recomputed in many digits.
@@ -102,14 +101,9 @@ def decide_half_angles(
     mask[index] = True
     high, low = np.zeros((2, 5, flat.size))
     for i in index:
+        member = i // shape[-1] if shape else 0
         *numbers, _ = exact_half_angle(
-            linkage,
-            float(flat[i]),
-            remainder,
-            unit,
-            i // shape[-1] if shape else 0,
-            bar,
-            left_out[i],
+            linkage, path, float(flat[i]), remainder, member, left_out[i]
         )
         for row, value in enumerate(numbers):
             high[row, i] = float(value)

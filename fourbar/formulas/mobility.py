@@ -17,14 +17,13 @@ from operator import mul
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fourbar.errors import expect
-from fourbar.formulas.path import ROLES_OF_BARS, prepare_path
-from fourbar.formulas.position import TOUCHING, find_parallel_pairs
+from fourbar.formulas.arithmetic import power_of_two
+from fourbar.formulas.path import prepare_path
+from fourbar.formulas.position import ROLES_OF_BARS, TOUCHING, find_parallel_pairs
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_bar
-
-Array = NDArray[np.float64]
+from fourbar.quantities import Array, Mask, Signs
 
 TURN = 2.0 * math.pi
 ANGLE_FROM_LIMITS = math.radians(1.0)
@@ -55,7 +54,7 @@ class LimitPosition(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Bar k against the rest of the loop, in the unit of `choose_power_of_two`.
+    """Bar k against the rest of the loop, in a power of two above the longest bar.
 
     Sums within rounding of 0 are 0.
     """
@@ -108,18 +107,12 @@ class Reach(NamedTuple):
         return 2.0 * half_at_near, 2.0 * half_at_far
 
 
-def choose_power_of_two(linkage: FourBar) -> float:
-    """Return a power of two near the longest bar, m."""
-    expect("linkage", linkage, FourBar)
-    _, exponent = math.frexp(max(linkage.lengths))
-    return math.ldexp(1.0, exponent)
-
-
 def reach_of(linkage: FourBar, bar: int = 2) -> Reach:
     """Return bar 2, 3 or 4 against the rest of the loop; InputError for another bar."""
+    expect("linkage", linkage, FourBar)
     bar = require_bar("bar", bar)
     # the division is exact, and no product of lengths leaves the range of doubles
-    unit = choose_power_of_two(linkage)
+    unit = power_of_two(max(linkage.lengths))
     d, *moving = (length / unit for length in linkage.lengths)
     driven = moving.pop(bar - 2)
     return Reach(d, driven, *moving)
@@ -328,8 +321,8 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 def find_circuit(
     linkage: FourBar,
     theta_2: Array,
-    branch: int | NDArray[np.int8],
-) -> NDArray[np.int8]:
+    branch: int | Signs,
+) -> Signs:
     """Return the index in `circuits` of each position, (n,); -1 if not assembled.
 
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
@@ -342,14 +335,14 @@ def find_circuit(
 
 
 def find_circuit_where(
-    assembles: NDArray[np.bool_],
+    assembles: Mask,
     linkage: FourBar,
     theta_2: Array,
-    branch: int | NDArray[np.int8],
-) -> NDArray[np.int8]:
+    branch: int | Signs,
+) -> Signs:
     """Return the index in `circuits` of positions known to assemble, else -1."""
     every = circuits(linkage)
-    is_second: NDArray[np.bool_] | bool = False
+    is_second: Mask | bool = False
     if len(every[0].branches) == 1:
         is_second = np.not_equal(branch, every[0].branches)
     elif len(every) == 2:  # their ranges are mirror images in the ground's line
@@ -417,7 +410,8 @@ def classify(linkage: FourBar, within: float = TOUCHING) -> LinkageType:
     Source: C. R. Barker, A complete classification of planar four-bar linkages,
     Mechanism and Machine Theory 20 (1985).
     """
-    unit = choose_power_of_two(linkage)
+    expect("linkage", linkage, FourBar)
+    unit = power_of_two(max(linkage.lengths))
     lengths = tuple(length / unit for length in linkage.lengths)
     least = min(lengths)
     most = max(lengths)

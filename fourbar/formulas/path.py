@@ -38,6 +38,7 @@ from fourbar.formulas.motion import (
     take_sines_of_rates,
 )
 from fourbar.formulas.position import (
+    ROLES_OF_BARS,
     HalfAngle,
     Loop,
     Passing,
@@ -55,8 +56,6 @@ from fourbar.linkage import FourBar
 
 NO_DIGIT_LEFT = 16.0 * 2.0**-53
 """|sin mu| at or below this: the directions of bars 3 and 4 are the same in doubles."""
-ROLES_OF_BARS = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
-"""The bars that are input, coupler and output of the loop read from a bar; and back."""
 
 
 class LoopPath(NamedTuple):
@@ -109,14 +108,9 @@ class LoopPath(NamedTuple):
 
         Given the sign at that angle, it returns the assembly.
         """
-        if not self.has_change_point:
+        if not is_any(self.passing.outer | self.passing.inner):
             return branch
         return branch * self.half_angle(q).root_sign
-
-    @property
-    def has_change_point(self) -> bool:
-        """True if a root passes through zero with its sign."""
-        return is_any(self.passing.outer | self.passing.inner)
 
     def passes_zero(self, half: HalfAngle) -> Number:
         """Mark where the smaller root is one that passes through zero.
@@ -178,65 +172,40 @@ class LoopPath(NamedTuple):
         if is_any(singular):
             root = np.where(singular, np.nan, position.root)
             position = position._replace(root=root)
-        return *self.motion(position, branch), position.sin_mu
-
-    def motion(
-        self,
-        position: Position,
-        branch: Number,
-    ) -> tuple[Position, Coefficients]:
-        """Compute positions and kinematic coefficients by q, the bars in usual order.
-
-        `position`: of the loop as it is read.
-        """
+        sine = position.sin_mu
         k = coefficients(self.lengths, position)
         position = take_sines_of_rates(self.lengths, position, k)
         if self.may_stay_parallel:
             first, second = find_parallel_pairs(self.lengths, branch)
             regular = ~np.isnan(position.root)
             k = put_parallel_speeds(k, first & regular, second & regular)
-        if self.bar == 2:
-            return (position, k)
-        return (self.in_order(position), _read_from(self.bar, k))
+        return self.in_order(position), _read_from(self.bar, k), sine
 
     def in_order(self, position: Position) -> Position:
         """Put the bars in their usual order; the triangle stays that of the reading."""
         if self.bar == 2:
             return position
+        roles = ROLES_OF_BARS[self.bar]
+        u1 = position.u1
+        directions: tuple[Number, ...] = position[:4]
+        u2, u3, u4 = (directions[role - 1] for role in roles)
+        if self.bar == 4:
+            u1 = -u1
+            u3 = -u3
         d, _, b, c, _, _ = self.lengths
-        if self.bar == 3:
-            u1 = position.u1
-            u2 = position.u3
-            u3 = position.u2
-            u4 = position.u4
-            a = b
-        else:
-            u1 = -position.u1
-            u2 = position.u4
-            u3 = -position.u3
-            u4 = position.u2
-            a = c
+        a = self.lengths[roles[0] - 1]
         diagonal = (d * self.unit) * u1 - (a * self.unit) * u2
         # the root is NaN where speeds are 0/0; the sine still has its value
-        closed = position._replace(
-            root=position.sin_mu * (2.0 * self.lengths.b * self.lengths.c)
-        )
-        return Position(
-            u1,
-            u2,
-            u3,
-            u4,
-            self.drive_sine(closed, 2),
-            diagonal,
-            position.e2,
-            position.root,
-            position.half,
+        closed = position._replace(root=position.sin_mu * (2.0 * b * c))
+        sin_mu = self.drive_sine(closed, 2)
+        return position._replace(
+            u1=u1, u2=u2, u3=u3, u4=u4, sin_mu=sin_mu, diagonal=diagonal
         )
 
     def drive_sine(self, position: Position, drive_bar: int) -> Number:
         """Compute the sine between the two bars that are not driven.
 
-        The positions are those of `motion`; those of `on_curve` in
+        The positions are those of `close`; those of `on_curve` in
         `studies/circuit_curve.py` have no half angle.
         """
         if position.half is None:
@@ -343,25 +312,21 @@ def drive_sine_of_triangle(lengths: Loop, position: Position, drive_bar: int) ->
 
     `lengths`: of the loop that the position was closed with.
     """
-    if drive_bar == 2:
-        return position.sin_mu
     d, a, b, c, _, _ = lengths
     ss, _, sk, _, inner, _ = position.half
     along = ((d - a) - 2.0 * d * ss) * position.root
+    across = 2.0 * d * sk
     if drive_bar == 3:
-        return (along + 2.0 * d * sk * (inner - 2.0 * c * (b - c))) / (
-            2.0 * c * position.e2
-        )
-    return (along - 2.0 * d * sk * (inner + 2.0 * b * (b - c))) / (
-        2.0 * b * position.e2
-    )
+        across = across * (inner - 2.0 * c * (b - c))
+        return (along + across) / (2.0 * c * position.e2)
+    across = across * (inner + 2.0 * b * (b - c))
+    return (along - across) / (2.0 * b * position.e2)
 
 
 def _read_from(bar: int, k: Coefficients) -> Coefficients:
-    """Return the coefficients of the loop read from bar 2, 3 or 4, bars in usual order.
-
-    The same exchange leads back.
-    """
+    """Return the coefficients of the loop read from a bar, bars in usual order."""
+    if bar == 2:
+        return k
     if bar == 3:
         return Coefficients(
             k.h3,
@@ -373,6 +338,4 @@ def _read_from(bar: int, k: Coefficients) -> Coefficients:
             k.dh2,
             k.dh4,
         )
-    if bar == 4:
-        return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)
-    return k
+    return Coefficients(k.h4, k.h3, k.h2, k.h43, k.h23, k.dh4, k.dh3, k.dh2)

@@ -36,6 +36,8 @@ from fourbar.formulas.arithmetic import (
     without_slopes,
 )
 
+ROLES_OF_BARS = {2: (2, 3, 4), 3: (3, 2, 4), 4: (4, 3, 2)}
+"""The bars that are input, coupler and output of the loop read from a bar; and back."""
 TOUCHING = 4.0 * U
 """Bars that miss each other, or a change point, by up to this times the sum of the
 lengths count as touching: lengths that are computed, as distances of points are, are
@@ -120,12 +122,8 @@ def reorder_lengths(
 
     The order is ground, the bar itself, coupler and output.
     """
-    d, a, b, c = lengths
-    if bar == 3:
-        return (d, b, a, c)
-    if bar == 4:
-        return (d, c, b, a)
-    return (d, a, b, c)
+    a, b, c = (lengths[role - 1] for role in ROLES_OF_BARS[bar])
+    return lengths[0], a, b, c
 
 
 def loop(d: Number, a: Number, b: Number, c: Number) -> Loop:

@@ -140,10 +140,6 @@ def _write_comment(
     return "\n".join([*lines, notes[reader]])
 
 
-DRAKE_NAMESPACE = "http://drake.mit.edu"
-"""Namespace of the elements that only Drake reads."""
-
-
 def write_sdf(
     scene: Scene,
     reader: str = "gazebo",
@@ -184,7 +180,7 @@ def write_sdf(
         omega_2, at_A, omega_4 = numbers[3:]
         at_B = f", joint B {omega_2 + at_A - omega_4!r} rad/s"
     else:
-        root.set("xmlns:drake", DRAKE_NAMESPACE)
+        root.set("xmlns:drake", "http://drake.mit.edu")
         if "B" in dynamics:
             raise LimitError("Drake's ball constraint at pin B has no damping")
     comment = _write_comment(scene, "SDF", reader, assembled, at_B, plane)

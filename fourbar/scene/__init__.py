@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fourbar.effects.effect import Effect
-from fourbar.effects.place import change_each, settler
+from fourbar.effects.place import Place, change_each, settler
 from fourbar.errors import InputError, LimitError, expect, write_in_units
 from fourbar.formulas.arithmetic import (
     PI_LOW,
@@ -49,7 +49,7 @@ from fourbar.scene.numbers import Point, Tolerance
 from fourbar.scene.pictures import Picture, TracedPicture
 
 if TYPE_CHECKING:
-    from fourbar.effects import ForceDrive, LinearDrive, Load, Place
+    from fourbar.effects import ForceDrive, LinearDrive, Load
 
 
 def load_show(module: str) -> Any:
@@ -199,16 +199,16 @@ class Scene:
 
     def settled_drive(self) -> "ForceDrive | None":
         """Return the drive as the settled scene has it; None: it is a couple."""
-        if self.drive is None:
-            return None
-        return self.drive.with_places(settler(self.linkage, self.points))
+        return self.settled().drive
 
     def in_pairs_from_pins(self) -> "Scene":
         """Return the scene with every place as a pair (distance, angle).
 
         The pair is from the first pin of the place's bar.
         """
-        return self.settled().with_places(lambda place: place.in_one_pair())
+        return self.settled().with_places(
+            lambda place: Place(place.bar, place.polar_from_pin())
+        )
 
     def _require_points(self) -> None:
         """Raise InputError for a place at a missing point, or another bar's."""

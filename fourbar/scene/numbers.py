@@ -104,8 +104,6 @@ TAKEN_NAMES = frozenset(
 """Names that a table or a JSON object has already, and the pins."""
 
 
-_THREE_SIGMA = 3.0
-"""Half width of a normal distribution in a worst case, in standard deviations."""
 LENGTH_NUMBERS = {
     **FourBar.numbers,
     **{BAR_NAMES[bar]: Bar.numbers["length"] for bar in MOVING_BARS},
@@ -195,5 +193,5 @@ class Tolerance:
     def reach(self) -> float:
         """The largest change that a worst case counts with."""
         if self.sigma:
-            return _THREE_SIGMA * self.width
+            return 3.0 * self.width  # three standard deviations
         return self.width

@@ -26,9 +26,6 @@ from fourbar.writing import read_bytes
 
 LARGEST_PICTURE = 2_000_000
 """Bytes of one picture: a page with three of them still opens quickly."""
-LONGEST_FILE_NAME = 200
-LONGEST_SVG_HEAD = 2000
-"""Bytes within which an SVG file has its first tag."""
 _RASTER = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """First bytes of the formats that may be attached. SVG may not, because it can carry
 scripts.
@@ -55,11 +52,7 @@ class _PictureFile:
             part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
             for part in parts
         )
-        if (
-            not plain
-            or not self.name.isprintable()
-            or len(self.name) > LONGEST_FILE_NAME
-        ):
+        if not plain or not self.name.isprintable() or len(self.name) > 200:
             raise InputError(self.key, self.name, ALLOWED_PICTURE)
 
     def find_file(self) -> Path:
@@ -169,7 +162,7 @@ def read_picture(
     for magic, kind in _RASTER.items():
         if content.startswith(magic):
             return content, kind
-    if "SVG" in allowed and b"<svg" in content[:LONGEST_SVG_HEAD]:
+    if "SVG" in allowed and b"<svg" in content[:2000]:  # its first tag
         return content, "image/svg+xml"
     raise InputError(key, shown, f"must be a {allowed} picture")
 

@@ -19,14 +19,12 @@ from fourbar import (
     solve,
 )
 from fourbar.effects.pin_friction import (
-    MANY,
-    NO_SOLUTION,
-    ONE_SOLUTION,
     find_least_stretch,
     solve_sliding,
 )
 from fourbar.errors import InputError, LimitError
 from fourbar.evaluation.case import compute_shown_state
+from fourbar.quantities import JAMMED, OK, SEVERAL
 from fourbar.scene import Command, Scene
 from tests.support.rows import read_rows
 from tests.support.scenes import CRANK_ROCKER_LENGTHS, UNIFORM, crank_rocker, find_angle
@@ -50,7 +48,7 @@ CONES = read_rows("""
 1 0 | 0.9999990463256836 0 | one | 1048576 | 9.5367431640625e-07
 """)
 """F, C, then the number of solutions, x and the distance from jamming, by hand."""
-NUMBERS = {"none": NO_SOLUTION, "one": ONE_SOLUTION, "many": MANY}
+NUMBERS = {"none": JAMMED, "one": OK, "many": SEVERAL}
 
 
 @mark.parametrize("F, C, number, x, far", CONES)
@@ -62,7 +60,7 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
     """
     F, C = (complex(*map(float, text.split())) for text in (F, C))
     sliding = solve_sliding(np.array([[F]]), np.array([[[C]]]), np.array([[1.0]]))
-    assert sliding.number[0] == NUMBERS[number]
+    assert sliding.status[0] == NUMBERS[number]
     assert sliding.x[0, 0] == approx(float(x), rel=1e-15, nan_ok=True)
     if number != "none":
         distance = approx(float(far), rel=LAST_DIGITS)
@@ -72,20 +70,20 @@ def test_one_cone_has_one_none_or_two_solutions(F, C, number, x, far):
 @mark.parametrize(
     "c1, c2, number",
     [
-        (0.5, 0.3, ONE_SOLUTION),
-        (2.0, 0.3, NO_SOLUTION),
-        (-2.0, 0.3, MANY),
-        (-2.0, -3.0, MANY),
+        (0.5, 0.3, OK),
+        (2.0, 0.3, JAMMED),
+        (-2.0, 0.3, SEVERAL),
+        (-2.0, -3.0, SEVERAL),
     ],
 )
 def test_two_pins_that_do_not_feel_each_other_are_two_single_ones(c1, c2, number):
     F = np.array([[1.0 + 0j, 2.0]] * 2)
     C = np.array([[[c1 + 0j, 0.0], [0.0, c2]]] * 2)
     sliding = solve_sliding(F, C, np.array([[1.0, 1.0], [0.25, 0.125]]))
-    assert [*sliding.number] == [number, ONE_SOLUTION]
+    assert [*sliding.status] == [number, OK]
     slight = 0.25 / (1.0 - 0.25 * c1), 0.25 / (1.0 - 0.125 * c2)
     assert sliding.x[1] == approx(slight, rel=1e-12)
-    if number != NO_SOLUTION:
+    if number != JAMMED:
         right = 1.0 / (1.0 - c1), 2.0 / (1.0 - c2)
         assert sliding.x[0] == approx(right, rel=1e-12)
         # both slopes are 1 - k c where F + C x keeps the sense of F

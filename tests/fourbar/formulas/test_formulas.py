@@ -187,12 +187,11 @@ def test_positions_decided_in_many_digits_replace_their_own_alone(offset, bar):
     path = prepare_path(bars.lengths, 0.4, bar)
     half = path.half_angle(theta)
     remainder = None if offset is None else mp.mpf(offset)
-    asked = [1, 4], theta, remainder, bar
-    decided = decide_half_angles(bars, path.unit, half, *asked)
+    decided = decide_half_angles(bars, path, half, [1, 4], theta, remainder)
     assert decided.root_sign == half.root_sign == 1.0
     for n in range(5):
         exact = [
-            float(exact_half_angle(bars, angle, remainder, path.unit, bar=bar)[n])
+            float(exact_half_angle(bars, path, angle, remainder)[n])
             for angle in theta[[1, 4]].tolist()
         ]
         assert decided[n][[1, 4]].tolist() == exact
