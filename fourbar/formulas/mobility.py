@@ -17,13 +17,15 @@ from operator import mul
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fourbar.errors import expect
 from fourbar.formulas.arithmetic import power_of_two
 from fourbar.formulas.path import prepare_path
 from fourbar.formulas.position import ROLES_OF_BARS, TOUCHING, find_parallel_pairs
 from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_bar
-from fourbar.quantities import Array, Mask, Signs
+
+Array = NDArray[np.float64]
 
 TURN = 2.0 * math.pi
 ANGLE_FROM_LIMITS = math.radians(1.0)
@@ -321,8 +323,8 @@ def circuits(linkage: FourBar) -> tuple[Circuit, ...]:
 def find_circuit(
     linkage: FourBar,
     theta_2: Array,
-    branch: int | Signs,
-) -> Signs:
+    branch: int | NDArray[np.int8],
+) -> NDArray[np.int8]:
     """Return the index in `circuits` of each position, (n,); -1 if not assembled.
 
     `theta_2`: (n,), rad. `branch`: +1 or -1, or one of them for each position (n,).
@@ -335,14 +337,14 @@ def find_circuit(
 
 
 def find_circuit_where(
-    assembles: Mask,
+    assembles: NDArray[np.bool_],
     linkage: FourBar,
     theta_2: Array,
-    branch: int | Signs,
-) -> Signs:
+    branch: int | NDArray[np.int8],
+) -> NDArray[np.int8]:
     """Return the index in `circuits` of positions known to assemble, else -1."""
     every = circuits(linkage)
-    is_second: Mask | bool = False
+    is_second: NDArray[np.bool_] | bool = False
     if len(every[0].branches) == 1:
         is_second = np.not_equal(branch, every[0].branches)
     elif len(every) == 2:  # their ranges are mirror images in the ground's line

@@ -14,6 +14,7 @@ from fourbar.errors import InputError, expect
 from fourbar.formulas.arithmetic import Number, cross, sine
 from fourbar.formulas.mobility import (
     TURN,
+    Array,
     change_points,
     circuits,
     turns_fully,
@@ -27,7 +28,6 @@ from fourbar.linkage import (
     require_bar,
     require_numbers,
 )
-from fourbar.quantities import Array, Signs
 
 
 class PointCoefficients(NamedTuple):
@@ -104,7 +104,7 @@ class CouplerCurve(NamedTuple):
 
     theta_2: Array
     """rad; not wrapped."""
-    branch: Signs
+    branch: NDArray[np.int8]
     """Sign of sin(theta_4 - theta_3)."""
     x: Array
     """m."""
