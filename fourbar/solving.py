@@ -107,7 +107,7 @@ def solve(
             allowed = "a study states its own positions: vary the commanded angle"
             raise InputError("at", "a command", allowed)
         return scene.solve(stage, out=out, side=side)
-    of_release = dict[str, Any]()
+    of_release: dict[str, Any] = {}
     if at is not None:
         _require_command_at(at)
     elif scene.motion.free is not None:

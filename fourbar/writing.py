@@ -6,10 +6,12 @@ Representations of results are written here too.
 import json
 import math
 import os
+import shutil
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -159,31 +161,23 @@ def write_bytes(path: str | Path, data: bytes, *, private: bool = False) -> None
         with name_file(target), target.open("wb") as file:
             file.write(data)
         return
-    import tempfile
-
+    temporary = target.with_name(
+        f".{target.name[:100]}.{os.urandom(8).hex()}{_TEMPORARY}"
+    )
+    opener = partial(os.open, mode=0o600 if private else 0o666)
     with name_file(target):
-        prefix = f".{target.name[:100]}."
-        handle, temporary = tempfile.mkstemp(_TEMPORARY, prefix, target.parent)
         try:
-            with os.fdopen(handle, "wb") as file:
+            with open(temporary, "xb", opener=opener) as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
             if not private:
-                os.chmod(temporary, _choose_mode(target))  # mkstemp makes it private
+                with suppress(FileNotFoundError):
+                    shutil.copymode(target, temporary)
             os.replace(temporary, target)
         except BaseException:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise
-
-
-def _choose_mode(target: Path) -> int:
-    """Return the mode of the file that is there, or that of a new file."""
-    with suppress(FileNotFoundError):
-        return stat.S_IMODE(target.stat().st_mode)
-    umask = os.umask(0)
-    os.umask(umask)
-    return 0o666 & ~umask
 
 
 def write_text(path: str | Path, text: str) -> None:

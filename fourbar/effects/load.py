@@ -124,8 +124,6 @@ class Table(Described):
         first = self.theta_2[0]
         last = self.theta_2[-1]
         beyond = place > last + 1e-12 * TURN
-        if not beyond.any():
-            return place
         # a position just below the first angle has come round to a whole turn above it
         round_ = beyond & (first + TURN - place < 1e-12 * TURN)
         outside = beyond & ~round_

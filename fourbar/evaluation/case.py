@@ -248,13 +248,10 @@ class Case(NamedTuple):
             acceleration,
         )
 
-    def at(self, at: Command, *, moving: bool = True) -> State:
-        """Compute the positions of a command, and their motion.
-
-        `moving`: False: positions only.
-        """
+    def at(self, at: Command) -> State:
+        """Compute the positions of a command, and their motion."""
         half, _ = self.half_angle(at)
-        return self.assemble(at, half, moving=moving)
+        return self.assemble(at, half)
 
     def begin_with(self, motion: Command) -> "Case":
         """Return a copy whose path-dependent effects begin where a motion assembles.

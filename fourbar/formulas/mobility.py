@@ -27,7 +27,7 @@ from fourbar.linkage import BAR_NAMES, MOVING_BARS, FourBar, Lengths, require_ba
 
 Array = NDArray[np.float64]
 
-TURN = 2.0 * math.pi
+TURN = math.tau
 ANGLE_FROM_LIMITS = math.radians(1.0)
 """Angle that `choose_range` leaves out at each end of an interval. No speeds exist at a
 limit itself.

@@ -459,7 +459,7 @@ def find_start(scene: Scene) -> Start:
 def _compute_span(linkage: FourBar) -> float:
     """Compute the width of the range that the input can turn through, rad."""
     least, most = choose_range(linkage)
-    return min(abs(most - least), 2.0 * math.pi)
+    return min(abs(most - least), math.tau)
 
 
 SINGLE = replace(RECIPE, flywheel=1e3, pad=None)

@@ -91,10 +91,8 @@ class DrawnPins(Described):
         if bar != 2:
             return angle
         ground = self.angle(1)
-        turned = math.remainder(angle - ground, 2.0 * math.pi)
-        return angle + 2.0 * math.pi * round(
-            (ground + turned - angle) / (2.0 * math.pi)
-        )
+        turned = math.remainder(angle - ground, math.tau)
+        return angle + math.tau * round((ground + turned - angle) / math.tau)
 
     def into_bar(self, bar: int, place: PlanePoint) -> complex:
         """Return a place of the drawing in a bar's frame: along + i across, m.
