@@ -321,8 +321,6 @@ def withhold_infinite(case: Case, evaluated: Evaluated) -> None:
         fails = infinite & (has_forces if stage >= FORCE else has_motion)
         first[fails] = np.minimum(first[fails], stage)
     gone = first < len(STAGES)
-    if not gone.any():
-        return
     code[gone] = OVERFLOW
     if isinstance(case.drive, Couple):
         # where the two bars that are not driven are in line, no finite forces hold

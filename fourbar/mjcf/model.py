@@ -112,6 +112,8 @@ _NEVER_NEEDED = ("contact", "limit", "island", "sensor")
 """Features that a closed loop of bars never uses; without contacts there is no
 midphase, and MuJoCo Warp does not load a file that switches it off.
 """
+_FLAGS = {"spring": "stiffness", "frictionloss": "frictionloss", "damper": "damping"}
+"""Features that are needed where a pin has an attribute, or for springs."""
 _THICKNESS = 0.02
 """Radius of a bar's capsule, as a part of the longest bar."""
 
@@ -282,10 +284,6 @@ class Model:
         """Return True if loads or springs need actuators."""
         return bool(self.loads) or not all(map(_is_slack_somewhere, self.springs))
 
-    def used(self, attribute: str) -> bool:
-        """Return True if any pin carries the attribute."""
-        return any(attribute in attributes for attributes in self.pin.values())
-
     def add_option(self) -> None:
         """Add the timestep, integrator, solver and what effects state, as gravity.
 
@@ -302,14 +300,13 @@ class Model:
             iterations=settings.iterations,
             **self.option,
         )
-        unneeded = list(_NEVER_NEEDED)
-        if not self.springs and not self.used("stiffness"):
-            unneeded.append("spring")
-        if not self.used("frictionloss"):
-            unneeded.append("frictionloss")
-        if not self.used("damping"):
-            unneeded.append("damper")
-        add_element(option, "flag", **dict.fromkeys(unneeded, "disable"))
+        flags = dict.fromkeys(_NEVER_NEEDED, "disable")
+        for flag, attribute in _FLAGS.items():
+            if not any(attribute in stated for stated in self.pin.values()):
+                flags[flag] = "disable"
+        if self.springs:
+            flags.pop("spring", None)
+        add_element(option, "flag", **flags)
         # the viewer looks straight down on the plane
         visual = add_element(self.root, "visual")
         add_element(visual, "global", azimuth=90, elevation=-90)

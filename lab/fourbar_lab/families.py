@@ -91,10 +91,14 @@ def _draw_near_limit(rng: Generator) -> DrawnLinkage:
     while True:
         d, a, b, c = rng.uniform(0.1, 1.0, 4)
         folded = bool(rng.random() < 0.5)
-        cosine = (a * a + d * d - (b - c if folded else b + c) ** 2) / (2 * a * d)
+        diagonal = b - c if folded else b + c
+        cosine = (a * a + d * d - diagonal**2) / (2 * a * d)
         if abs(cosine) < 0.999:
-            offset = 10.0 ** rng.uniform(-12, -2) * (1.0 if folded else -1.0)
-            angle = float(rng.choice([-1.0, 1.0])) * (math.acos(cosine) + offset)
+            offset = 10.0 ** rng.uniform(-12, -2)
+            if not folded:
+                offset = -offset
+            side = float(rng.choice([-1.0, 1.0]))
+            angle = side * (math.acos(cosine) + offset)
             return (d, a, b, c), command_angle(angle)
 
 
@@ -249,13 +253,12 @@ def torsion(rng: Generator) -> Scene:
     preload = 0.0
     if rng.random() < 0.5:
         preload = rng.uniform(-2.0, 2.0) * stiffness
-    turns = math.tau * float(rng.choice([0, 0, int(rng.integers(-100, 100))]))
-    rest = (
-        float(theta[second - 1] - theta[first - 1]) * (1.0 + _draw_deviation(rng))
-        + preload / stiffness
-        + turns
-    )
-    return replace(scene, effects=(Torsion.at(**{pin: (stiffness, rest, preload)}),))
+    many = int(rng.integers(-100, 100))
+    turns = math.tau * float(rng.choice([0, 0, many]))
+    relative = float(theta[second - 1] - theta[first - 1])
+    rest = relative * (1.0 + _draw_deviation(rng)) + preload / stiffness + turns
+    spring = Torsion.at(**{pin: (stiffness, rest, preload)})
+    return replace(scene, effects=(spring,))
 
 
 def tables(rng: Generator) -> Scene:
@@ -276,7 +279,8 @@ def tables(rng: Generator) -> Scene:
     first = -rise * before * factor
     last = first + rise * (before + after)
     table = Table((angle - before, angle + after), (first, last))
-    turns = int(rng.choice([0, 1, -1, int(10.0 ** rng.uniform(0.0, 9.0))]))
+    many = int(10.0 ** rng.uniform(0.0, 9.0))
+    turns = int(rng.choice([0, 1, -1, many]))
     size = rng.uniform(0.1, 10.0)
     arm = rng.uniform(0.0, 1.0)
     turned = (float(x) for x in rng.uniform(-3.0, 3.0, 2))
@@ -388,7 +392,8 @@ def _near_pins(rng: Generator) -> Scene:
         return _drive_by(ANYWHERE.draw(rng), LinearDrive(start, end))
     stiffness = rng.uniform(10.0, 1000.0)
     length = rng.uniform(0.0, 2.0)
-    return replace(scene, effects=(Springs((Spring(start, end, stiffness, length),)),))
+    spring = Spring(start, end, stiffness, length)
+    return replace(scene, effects=(Springs((spring,)),))
 
 
 FAMILY_DRAWERS: dict[str, Callable[[Generator], Scene]] = {

@@ -90,7 +90,8 @@ def _compute_exact_slopes(scene: Scene) -> tuple[BallValues, Slopes]:
         twice = moved(first, mate)
         for name, y in base.items():
             change = twice[name] - once[first][name] - once[mate][name] + y
-            second = abs(float((change / (steps[first] * steps[mate])).mid()))
+            curvature = change / (steps[first] * steps[mate])
+            second = abs(float(curvature.mid()))
             rates[name][first] += abs(numbers[mate]) * second
             if first == mate:
                 # a difference to second order: where a number is 0 that may be all

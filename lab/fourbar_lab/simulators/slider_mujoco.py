@@ -45,7 +45,9 @@ class MujocoSlider:
 
     def set(self, q: Array, v: Array) -> None:
         """Set joint positions and speeds."""
-        self.data.qpos[:], self.data.qvel[:], self.data.qacc[:] = q, v, 0.0
+        self.data.qpos[:] = q
+        self.data.qvel[:] = v
+        self.data.qacc[:] = 0.0
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
 
@@ -62,7 +64,8 @@ class MujocoSlider:
 
     def inverse(self, a: Array) -> Array:
         """Return the joint forces of accelerations a, with no force at the cut."""
-        self.data.xfrc_applied[:], self.data.qacc[:] = 0.0, a
+        self.data.xfrc_applied[:] = 0.0
+        self.data.qacc[:] = a
         mujoco.mj_inverse(self.model, self.data)
         return np.array(self.data.qfrc_inverse)
 
