@@ -5,6 +5,7 @@ import runpy
 from collections import Counter
 from functools import cache
 from graphlib import TopologicalSorter
+from importlib import import_module
 
 from pytest import mark
 
@@ -207,3 +208,17 @@ def test_nothing_that_is_shipped_knows_the_lab():
     ]
     assert len(shipped) > 200
     assert not [path for path in shipped if "fourbar_lab" in read(path)]
+
+
+@mark.parametrize(
+    "script",
+    [path for name in ("docs", "benchmarks") for path in (ROOT / name).rglob("*.py")],
+    ids=lambda path: path.name,
+)
+def test_the_scripts_of_the_pages_import_what_there_is(script):
+    for node in ast.walk(parse(script)):
+        match node:
+            case ast.ImportFrom(str(module), aliases):
+                if module.partition(".")[0] in PACKAGES:
+                    names = {alias.name for alias in aliases}
+                    assert names <= {*dir(import_module(module))}, module
