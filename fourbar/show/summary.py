@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fourbar.formulas.mobility import choose_range
+from fourbar.formulas.mobility import choose_range, turns_fully
+from fourbar.formulas.path import count_turns
 from fourbar.linkage import MOVING_BARS
 from fourbar.quantities import OK, Array
 from fourbar.scene import find_stroke_ranges
-from fourbar.scene.motion import Motion, Sweep
+from fourbar.scene.motion import BRANCH_NAMES, Motion, Sweep
 from fourbar.show.driving import (
     is_once_round,
     leaves_range,
@@ -241,10 +242,10 @@ class Facts:
 
     @cached_property
     def stroke_limits(self) -> tuple[float, float] | None:
-        """The least and the greatest stroke over all angles of the commanded bar.
+        """The least and the greatest stroke over the circuit of the motion.
 
-        The angles are all that it reaches on its branch, and on its side of the
-        cylinder if a stroke is commanded.
+        The circuit goes on where the commanded bar reverses. A commanded stroke stays
+        on its side of the cylinder.
         """
         solution = self.solution
         if solution.stroke is None:
@@ -257,14 +258,20 @@ class Facts:
             ranges = find_stroke_ranges(scene)
             return min(ranges, key=lambda ends: max(ends[0] - stroke, stroke - ends[1]))
         here = float(at.angle[first])
+        linkage = scene.linkage
         # angle that is left out of a range at its limit positions, rad. These may not
         # assemble as doubles
-        low, high = choose_range(scene.linkage, at.bar, here, 1e-9)
+        low, high = choose_range(linkage, at.bar, here, 1e-9)
         sweep = {f"theta_{at.bar}": Sweep(low, high, 48)}
-        motion = Motion(**sweep, branch=int(at.branch[first]))  # type: ignore[arg-type]
-        whole = solve(replace(scene, motion=motion, tolerances=()), "position")
-        panels = describe_motion(whole).positions
-        least, most = (panels.find_peak("stroke", end).value for end in (LOWER, UPPER))
+        in_one_turn = count_turns(linkage.lengths, at.bar) == 1
+        is_whole = turns_fully(linkage, at.bar) and in_one_turn
+        strokes = []
+        for branch in (int(at.branch[first]),) if is_whole else BRANCH_NAMES:
+            motion = Motion(**sweep, branch=branch)  # type: ignore[arg-type]
+            of_branch = solve(replace(scene, motion=motion, tolerances=()), "position")
+            panels = describe_motion(of_branch).positions
+            strokes += [panels.find_peak("stroke", end).value for end in (LOWER, UPPER)]
+        least, most = min(strokes), max(strokes)
         # a cylinder whose ends meet has a corner there
         return 0.0 if least <= EXTREME_ERROR * most else least, most
 

@@ -734,20 +734,35 @@ def test_a_cylinder_assembles_from_where_its_ends_meet(bar):
     assert bar == 3 or high == approx(0.2, rel=1e-12)
 
 
-@mark.parametrize("number", [0, 1])
-def test_a_cylinder_assembles_over_the_range_that_its_bar_is_in(number):
-    """The rocker has two ranges, which the crank's line mirrors."""
+@mark.parametrize("number, branch", [(0, -1), (1, 1)])
+@mark.parametrize("bar", (3, 4))
+def test_a_cylinder_assembles_over_the_circuit_of_its_motion(bar, number, branch):
+    """The rocker has two ranges, which the crank's line mirrors, each a branch of the
+    crank, whose whole turn passes both of the rocker's.
+    """
     low, high = find_intervals(MASSLESS, 4)[number]
-    drive = LinearDrive(Place(1, (0.5, 0.3)), Place(4, (0.1, 0.0)))
+    drive = LinearDrive(Place(1, (0.5, 0.3)), Place(bar, (0.1, 0.0)))
 
-    def sweep(start, steps):
-        motion = Motion(theta_4=Sweep(start, high - 1e-9, steps))
-        return solve(Scene(MASSLESS, motion, drive=drive))
+    def move(**motion):
+        return Facts(solve(Scene(MASSLESS, Motion(**motion), drive=drive)))
 
-    stroke = sweep(low + 1e-9, 4000).stroke
+    turned = move(theta_2=Sweep(0.0, tau, 4000), branch=branch)
+    stroke = turned.solution.stroke
     ends = approx((stroke.min(), stroke.max()), rel=1e-6)
-    for start in (0.5 * (low + high), low, np.nextafter(low, -tau)):
-        assert Facts(sweep(start, 3)).stroke_limits == ends
+    assert turned.stroke_limits == ends
+    starts = 0.5 * (low + high), low, np.nextafter(low, -tau)
+    for start, of_rocker in zip(starts, (1, -1, 1), strict=True):
+        swept = move(theta_4=Sweep(start, high - 1e-9, 3), branch=of_rocker)
+        assert swept.stroke_limits == ends
+
+
+def test_a_cylinder_assembles_over_two_turns_beside_a_change_point():
+    """A turn of the crank leads to the mirror image, a second one back."""
+    linkage = uniform(0.3, 0.1, 0.35, 0.15)
+    drive = LinearDrive(Place(1, (0.5, 0.3)), Place(4, (0.1, 0.0)))
+    facts = Facts(solve(Scene(linkage, Motion(Sweep(0.0, 2 * tau, 8000)), drive=drive)))
+    stroke = facts.solution.stroke
+    assert facts.stroke_limits == approx((stroke.min(), stroke.max()), rel=1e-6)
 
 
 @mark.parametrize("away", (1e-6, 1e-9, 1e-10, 1e-11))
