@@ -576,6 +576,15 @@ def test_a_ratio_of_one_is_no_mistake_and_a_reversed_sign_has_one_text(judged, r
         assert [one.text for one in judgement.explanations] == texts
 
 
+def test_a_sign_that_negative_masses_would_explain_is_a_sign(judged):
+    """Nothing but masses and their weight acts."""
+    weighed = replace(OURS, loads=(), effects=(fourbar.Gravity(9.81, -pi / 2.0),))
+    numbers = right(weighed)
+    reversed_ = {name: -numbers[name] for name in FORCES}
+    (said,) = judged(weighed, numbers | reversed_).explanations
+    assert said.text == "sign reversed, or F_ij given for F_ji" and said.complete
+
+
 @mark.slow
 def test_a_position_that_agrees_by_chance_does_not_hide_a_mistake(judged):
     numbers = right(OURS)
@@ -746,7 +755,8 @@ REFUSED_MOTIONS = [
             "omega_2": 2.0,
             "free": fourbar.Free(1.0, 10),
         },
-        "not judged while released",
+        "not judged while released; without free and omega_2 each row is judged at its"
+        " own omega_2 and alpha_2",
     ),
     (
         {"law": Law((0.0, 0.5, 1.0, 1.5), (0.0, 1.0, 2.0, 3.0))},

@@ -348,3 +348,20 @@ def test_a_time_on_both_sides_of_a_peak_of_the_law_is_refused(decimals, rounded,
             Judgement(scene, table)
     else:
         assert Judgement(scene, table).status == HOLDS
+
+
+@mark.parametrize(
+    "speeds, alphas, said", [((3, 4), (), 1), ((3, 3), (), 0), ((3, 4), (0, 5), 0)]
+)
+def test_an_acceleration_that_no_row_states_is_said_to_be_zero(
+    speeds, alphas, said, read
+):
+    """Speeds that differ may be those of a motion that speeds up."""
+    scene = crank_rocker(Motion(0.4))
+    rates = [list(map(float, each)) for each in (speeds, alphas) if each]
+    torque = solve(replace(scene, motion=Motion([0.4, 0.8], *rates))).torque
+    heading = ",".join(["theta_2,torque", "omega_2", "alpha_2"][: 1 + len(rates)])
+    table = read(write(heading, [0.4, 0.8], torque, *rates))
+    judgement = Judgement(scene, table)
+    text = "alpha_2 is not in the table: it is taken as 0"
+    assert judgement.notes == (text,) * said and judgement.agreeing == 2

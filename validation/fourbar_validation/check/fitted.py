@@ -237,6 +237,8 @@ class _Family(NamedTuple):
     """Function of the number that returns the mistake of a problem."""
     of_ours: bool = True
     """True if the first is that of the right problem."""
+    least: float = -math.inf
+    """Least number that a problem can have."""
 
 
 def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -263,7 +265,7 @@ def _fit_problems(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mista
     ):
         fitted = _fit(columns, family, right, rounding, jumps)
         for number in () if fitted is None else (float(round(fitted)), fitted):
-            if abs(number) > LEAST_NUMBER:
+            if abs(number) > LEAST_NUMBER and number >= family.least:
                 mistake = family.make(number)._replace(times=CARRIED)
                 text = mistake.text
                 if family.start == 1.0 or number != round(number):
@@ -347,7 +349,8 @@ def _list_scenes(scene: Scene, at: Command) -> Iterator[_Family]:
     for name, length in lengths.items():
         fitted[f"lengths.{name}"] = {f"lengths.{name}": length}
     for name, group in fitted.items():
-        yield _Family(1.0, partial(_scale, scene, at, name, group))
+        least = 0.0 if name.startswith(("bars", "lengths")) else -math.inf
+        yield _Family(1.0, partial(_scale, scene, at, name, group), least=least)
     downwards = math.degrees(find_gravity(scene).angle) % 360.0
     yield _Family(360.0 + downwards, partial(_point_gravity, scene, at))
 

@@ -431,7 +431,8 @@ class Judge:
             for heading, why in table.left_out.items()
             if not (rows.later and why == NOT_JUDGED["time"])
         }
-        table = replace(table, columns=columns, left_out=left_out)
+        notes = (*table.notes, *rows.notes)
+        table = replace(table, columns=columns, left_out=left_out, notes=notes)
         if self.at.moves_stroke or table.found_by == "time":
             place = table.place._replace(values=self.at.angle)
             table = replace(table, place=place, found_by=f"theta_{self.at.bar}")

@@ -43,6 +43,8 @@ class RowCommands(NamedTuple):
     later: Callable[[Array | float], Command] | None = None
     """Commands so many seconds later, where the times of the rows say which these are.
     """
+    notes: tuple[str, ...] = ()
+    """Sentences on what is taken for a rate that the table does not state."""
 
 
 def _find_by_time(scene: Scene, table: TheirTable, base: Command) -> RowCommands:
@@ -103,7 +105,7 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
     if scene.motion.free is not None:
         allowed = (
             "not judged while released; without free and omega_2 each row is judged at"
-            " its own omega_2"
+            " its own omega_2 and alpha_2"
         )
         raise InputError("motion.free", None, allowed)
     if table.found_by == "time":
@@ -147,6 +149,10 @@ def find_row_commands(scene: Scene, table: TheirTable) -> RowCommands:
         found = _command_rounded(table, command_at)._replace(at=at)
     if stated:
         found = command_rates(found, table, stated)._replace(rates=rates)
+        speeds = stated["speed"].values
+        if len(stated) == 1 and np.ptp(speeds) and not base.acceleration:
+            said = f"{rates[1]} is not in the table: it is taken as 0"
+            found = found._replace(notes=(said,))
     return found
 
 

@@ -217,7 +217,8 @@ def _multiply_numbers(scene: Scene, places: bool) -> Iterator[tuple[str, Numbers
     """List numbers of a scene left out, doubled or reversed."""
     for name, group in group_numbers(scene, places).items():
         for factor, done in _DONE.items():
-            yield f"{name} {done}", {key: factor * x for key, x in group.items()}
+            if factor >= 0.0 or not any(key.endswith(".mass") for key in group):
+                yield f"{name} {done}", {key: factor * x for key, x in group.items()}
 
 
 def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
