@@ -1099,6 +1099,8 @@ def with_comma(theta, torque):
     [
         ("# made by hand\ntheta_2 [deg],torque",),
         ("# run 7\n# theta_2 [deg], torque [N m]",),
+        ("Reference Coordinate System:,Global\n\nCrank angle (deg),Torque (N m)",),
+        ("Run,7\nangle,torque\ndeg,N m",),
         ("Motion study 1\n,\ntheta_2 [deg],torque [N m]",),
         ('"Run 3, of May"\n"theta_2\n[deg]","torque\n[N m]"',),
         ("Study 1;\nKurbelwinkel [deg];Drehmoment [N m]", with_comma),

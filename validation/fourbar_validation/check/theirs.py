@@ -408,6 +408,7 @@ def _read_lines(
         numbered = [(reader.line_num, row) for row in reader if "".join(row).strip()]
     except csv.Error:
         raise InputError("table", name, "must be a CSV file") from None
+    numbered = numbered[_find_header([cells for _, cells in numbered]) :]
     if delimiter != ",":  # there a comma is a decimal comma
         numbered[1:] = [
             (line, [_read_comma(cell) for cell in cells])
@@ -420,6 +421,22 @@ def _read_lines(
     if len(numbered) < 2:
         raise InputError("table", name, "needs a header and at least one row")
     return numbered[0][1], units, numbered[1:]
+
+
+def _find_header(rows: list[list[str]]) -> int:
+    """Find the last row of text before the numbers, or the one above it if of units."""
+    numbers = [sum(map(_is_number, cells)) for cells in rows]
+    filled = [sum(map(bool, map(str.strip, cells))) for cells in rows]
+    first = next((i for i in range(len(rows)) if 2 * numbers[i] > filled[i]), 0)
+    header = max((i for i in range(first) if not numbers[i]), default=0)
+    is_below = header > 0 and len(rows[header]) == len(rows[header - 1])
+    return header - (is_below and _is_unit_line(rows[header]))
+
+
+def _is_number(cell: str) -> bool:
+    with suppress(InputError):
+        return not math.isnan(_read_cell(_read_comma(cell))[0])
+    return False
 
 
 def _blank_titles(lines: list[str]) -> list[str]:
