@@ -33,7 +33,7 @@ ELSEWHERE = (
 )
 """Address for people with another mechanism."""
 _OF_OTHER_MECHANISM = re.compile(
-    r"slider|(connecting_?)?rod|piston|rail|cam|gear|offset|dyad"
+    r"sliders?|slot|(connecting_?)?rod|piston|rail|cams?|gears?|offset|dyad"
     r"|precision_points|bell_?crank|(fif|six|seven|eigh)th"
     r"|(bell_?crank|link|bar|rod|arm|crank|rocker|coupler|input|output|slider)_?[0-9]+"
     r"|(v_|a_)?(theta|omega|alpha|G)_?([5-9]|1[0-9])|F([5-9][1-9]|[1-9][5-9])"

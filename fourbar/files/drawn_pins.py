@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fourbar.effects import ForceDrive, LinearDrive
-from fourbar.errors import InputError
+from fourbar.errors import ELSEWHERE, InputError
 from fourbar.files.fields import Entry
 from fourbar.formulas.arithmetic import cross
 from fourbar.formulas.mobility import count_equalities, meet_change_points
@@ -73,6 +73,8 @@ def read_drawing(top: Entry) -> DrawnPins | None:
     if top["lengths"].value is not None:
         allowed = "must be left out: the pins state the lengths and the ground's angle"
         raise top["lengths"].refuse(allowed)
+    if isinstance(pins.value, dict) and len(pins.value) > 5:  # a fifth may be a point
+        raise pins.refuse(ELSEWHERE)
     motion = top["motion"]
     if isinstance(motion.value, dict) and "branch" in motion.value:
         raise motion["branch"].refuse("must be left out: the pins state the assembly")

@@ -23,6 +23,7 @@ from fourbar.effects.place import (
 from fourbar.errors import (
     InputError,
     name_unit,
+    names_other_mechanism,
     suggest_keys,
 )
 from fourbar.linkage import (
@@ -130,10 +131,11 @@ class Entry:
         names = list(allowed)
         if not isinstance(self.value, dict):
             raise self.refuse(f"must be a table with the keys {', '.join(names)}")
-        for name in self.value:
-            if name not in names:
-                known = _WAYS.get(name) or suggest_keys(name, names)
-                raise self[name].refuse(f"unknown key; {known}")
+        unknown = [name for name in self.value if name not in names]
+        unknown.sort(key=names_other_mechanism, reverse=True)
+        for name in unknown:
+            known = _WAYS.get(name) or suggest_keys(name, names)
+            raise self[name].refuse(f"unknown key; {known}")
         return self.value
 
     def check(self, by: Any) -> Any:

@@ -544,8 +544,11 @@ OF_SIX_BARS = r"""bellcrank2 = "350 mm"
 link2 = "600 mm"
 slider = "1 mm"
 sixth = "1 mm"
+slot = "1 mm"
+crank = "1 mm"\nrod = "1 mm"
 [bars.link5]
 [link2]
+[gears]
 [motion]\ntheta_5 = "1 rad"
 [motion]\nlaw = { time = ["0 s", "1 s"], theta_6 = ["0 rad", "1 rad"] }
 [drive]\nbar = 6
@@ -563,6 +566,7 @@ sixth = "1 mm"
             (SIX_BARS + more, "(six bars) in PMKS+")
             for more in OF_SIX_BARS.splitlines()
         ),
+        ('pins = { O = "", A = "", B = "", C = "", D = "", E = "" }', "bars) in PMKS+"),
     ],
 )
 def test_a_file_is_refused_in_its_own_units_and_points_on(text, words, run):
