@@ -29,7 +29,7 @@ SHOWN = {
     "README": 2,
     "docs/commands": 7,
     "docs/gallery": 1,
-    "docs/guide-designer": 11,
+    "docs/guide-designer": 12,
     "docs/guide-roboticist": 12,
     "docs/theory": 2,
 }
