@@ -209,6 +209,8 @@ def refuse_key(key: str, value: object, keys: list[str]) -> InputError:
     """Make the error for a key that a study cannot vary; keys like it come first."""
     expect("key", key, str)
     allowed = suggest_keys(key, keys)
+    if key.endswith(("extended_force", "compressed_force")):
+        allowed = f"preload and stiffness state the force of a gas spring; {allowed}"
     return InputError(key, value, f"is no number of this scene; {allowed}")
 
 

@@ -115,6 +115,7 @@ lengths | pins.A.0 | must be among lengths.ground, lengths.input, lengths.couple
 lengths | points.P.drawn.0 | must be among points.P.from_pin.0
 lengths | loads.0.force.y | must be among loads.0.force.
 lengths | points.P.from_pn.1 | must be among points.P.from_pin.1
+places | effects.springs.0.gas.extended_force | preload and stiffness state the force
 places | effects.springs.0.gas.extended_force | effects.springs.0.preload
 places | pins.A.y | must be among pins.A.
 places | points.P.drawn | must be among points.P.drawn.0, points.P.drawn.1

@@ -1137,6 +1137,7 @@ def test_a_column_of_an_unknown_name_is_left_out_by_name(heading, torques):
     table = torques(f"theta_2 [deg],torque,{heading}", "{theta:.0f},{torque:.9e},1")
     ((name, why),) = table.left_out.items()
     assert name == heading and why.startswith("not a known column: known are")
+    assert "torque (drive_force of a cylinder)" in why
     with refused("needs a result; known are the columns of"):
         torques(f"theta_2 [deg],{heading}", "{theta:.0f},1")
 

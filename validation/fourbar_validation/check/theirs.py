@@ -90,7 +90,7 @@ _BY_UNIT = {
 _REACTIONS = {"F21": "F12", "F23": "F32", "F34": "F43", "F41": "F14"}
 """Pin forces on the other bar, and those that they are the opposite of."""
 _KNOWN = "known are the columns of fourbar analyze SCENE --csv, such as theta_2 [deg]"
-_KNOWN += ", torque, F12_x, F12_y, or F12 (its magnitude)"
+_KNOWN += ", torque (drive_force of a cylinder), F12_x, F12_y, or F12 (its magnitude)"
 OTHER_UNITS = {
     "rad": ("rad", "deg"),
     "rad/s": ("rad/s", "deg/s", "rpm", "rev/s"),
