@@ -364,4 +364,4 @@ def test_an_acceleration_that_no_row_states_is_said_to_be_zero(
     table = read(write(heading, [0.4, 0.8], torque, *rates))
     judgement = Judgement(scene, table)
     text = "alpha_2 is not in the table: it is taken as 0"
-    assert judgement.notes == (text,) * said and judgement.agreeing == 2
+    assert judgement.table.notes == (text,) * said and judgement.agreeing == 2

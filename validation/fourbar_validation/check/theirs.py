@@ -415,8 +415,7 @@ def _read_lines(
             for line, cells in numbered[1:]
         ]
     units: list[str] = []
-    number = r"(?<![A-Za-z^*])(?<!\^-)[0-9]"
-    if len(numbered) > 1 and not any(re.search(number, one) for one in numbered[1][1]):
+    if len(numbered) > 1 and _is_unit_line(numbered[1][1]):
         units = numbered.pop(1)[1]
     if len(numbered) < 2:
         raise InputError("table", name, "needs a header and at least one row")
@@ -434,6 +433,11 @@ def _find_header(rows: list[list[str]]) -> int:
     if above < 0 or names & {*_OTHER_NAMES} or len(rows[above]) != len(rows[header]):
         return header
     return above if _is_unit_line(rows[header]) else header
+
+
+def _is_unit_line(cells: list[str]) -> bool:
+    """Return whether a line under the header states units: no cell has a number."""
+    return not any(re.search(r"(?<![A-Za-z^*])(?<!\^-)[0-9]", one) for one in cells)
 
 
 def _is_number(cell: str) -> bool:
