@@ -313,6 +313,35 @@ def test_what_a_planted_difference_does_to_the_torque_is_its_virtual_work(what, 
     np.testing.assert_allclose(off, more(ours), atol=1e-6)
 
 
+BRAKED = replace(FEW, loads=(fourbar.Load(4, moment=-0.4),))
+BRAKE = '<general gainprm="0" biastype="affine" name="brake" {} biasprm="{}"/>'
+ARM = '<body><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+
+
+@pytest.mark.parametrize("bodies", ["", ARM])
+@pytest.mark.parametrize(
+    "form", ['joint="O4" gear="0.5"', 'site="B4" gear="0 0 0 0 0 0.5"']
+)
+def test_a_couple_on_a_hinge_of_the_ground_is_a_load_of_its_bar(form, bodies):
+    """The torque of a wrong one is off by its virtual work, moment times omega_4."""
+    text = put(write_mjcf(BRAKED), "</worldbody>", f"{bodies}</worldbody>")
+    right, wrong = (
+        examine_text(BRAKED, re.sub("<general [^>]*load_1[^>]*/>", brake, text))
+        for brake in (BRAKE.format(form, -0.8), BRAKE.format(form, 0.8))
+    )
+    assert not differences(BRAKED, right)
+    (one,) = differences(BRAKED, wrong).values()
+    assert one.write().startswith(
+        'loads.output.couple: 0.4, generated -0.4; in the file: actuator "brake"; '
+    )
+    at = wrong.loops[0].command(wrong.loops[0].states)
+    ours = solve(BRAKED, at=at)
+    extra = 0.8 * np.abs(ours.omega_4 / ours.omega_2).max()
+    priced = price(one, rows_of(BRAKED, [answer_changed(BRAKED, one, at)]), ())
+    assert priced.cost == approx(extra / np.abs(ours.torque).max(), rel=1e-9)
+    assert priced.cost == approx(errors(BRAKED, wrong)["torque"], rel=1e-9)
+
+
 def test_how_softly_dry_friction_slips_is_named_and_costs():
     """By default its couple rises over 0.02 s of slip."""
     text = re.sub(' sol(ref|imp)friction="[^"]*"', "", write_mjcf(DRY))

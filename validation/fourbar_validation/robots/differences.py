@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fourbar.effects import Gravity
-from fourbar.linkage import Bar, record
+from fourbar.effects import Gravity, Load
+from fourbar.linkage import BAR_NUMBERS, Bar, record
 from fourbar.quantities import FORCE_NAMES
 from fourbar.scene import Scene
 from fourbar.studies.keys import list_entries, read_number, replace_number
@@ -115,7 +115,7 @@ def find_differences(
 
 
 def change_scene(scene: Scene, one: Difference) -> Scene | None:
-    """Return a scene with a length, a number of a bar or gravity as in a file.
+    """Return a scene with a length, number of a bar, couple or gravity as in a file.
 
     None for other entries.
     """
@@ -126,6 +126,10 @@ def change_scene(scene: Scene, one: Difference) -> Scene | None:
         pull = change if one.key.endswith("x") else 1j * change
         further = Gravity(*cmath.polar(pull))
         return replace(scene, effects=(*scene.effects, further))
+    name = one.key.removeprefix("loads.").removesuffix(".couple")
+    if name in BAR_NUMBERS:
+        couple = Load(BAR_NUMBERS[name], moment=change)
+        return replace(scene, loads=(*scene.loads, couple))
     linkage = scene.linkage
     crank, coupler, output = (
         Bar(bar.length, bar.mass, bar.moment_of_inertia, bar.mass_centre)

@@ -51,10 +51,10 @@ JUDGED_HEADINGS = ("quantity", "theirs", "generated", "allowed", "verdict")
 _DIFFERENCES = ("cost", "what differs")
 _ABOUT_COSTS = (
     "cost: what this one entry adds to the error, in the formulas if it is a length,"
-    " a number of a bar or gravity, else in the file itself, first contacts and stops,"
-    " then the others without them. It is that of the torque or pin force whose error"
-    " grows most; of a setting, how far the worst error of all grows. A dash: this"
-    " entry cannot be set by itself, or the file holds what it is held to"
+    " a number of a bar, a load's couple or gravity, else in the file itself, first"
+    " contacts and stops, then the others without them. It is that of the torque or pin"
+    " force whose error grows most; of a setting, how far the worst error of all grows."
+    " A dash: this entry cannot be set by itself, or the file holds what it is held to"
 )
 _SETTINGS = ("changed alone", "single states", "through time", "cost")
 SCENE_ROUND_OFF = 1e-8

@@ -7,6 +7,7 @@ generated file.
 """
 
 import math
+from collections.abc import Iterator
 from itertools import chain, count
 from typing import Any
 
@@ -21,6 +22,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     list_actuators,
     list_lifted_masses,
     list_wraps,
+    take_control,
 )
 from fourbar_validation.engines.mujoco.robots.closures import describe_equality
 from fourbar_validation.engines.mujoco.robots.seen import SeenLoop
@@ -223,64 +225,76 @@ class _Description:
     def add_loads(self) -> None:
         """Describe what actuators exert with a control of 0.
 
-        At sites it is the sum on each bar, at hinges the couple. Forces that keep their
-        axes add up to one force, one couple, and the first moments r x F and r . F
-        about the bar's first pin, which tell where the force acts. The drive is taken
-        off, and is no load.
+        Couples at sites of a bar and constant ones at its hinge on the ground add up,
+        and so do forces at sites that keep their axes: to one force, and the first
+        moments r x F and r . F about the bar's first pin, which tell where it acts. At
+        other hinges it is the couple. The drive is taken off, and is no load.
         """
         seen = self.seen
         model = self.model
-        sums: dict[str, Array] = {}
-        for i in range(len(model.actuator_trntype)):
+        is_off = take_control(model) & (not seen.is_alone)
+        is_off[seen.drives] = True
+        loads: dict[str, dict[str, Array]] = {}
+        for i in np.flatnonzero(~is_off).tolist():
             bias = _read_bias(model, i)
-            if i in seen.drives or not bias.any():
+            if not bias.any():
                 continue  # it exerts what it is told to, and it is told nothing
             number = int(model.actuator_trnid[i, 0])
             exerted = model.actuator_gear[i, 0] * bias
             kind = model.actuator_trntype[i]
             element = self.name("actuator", i)
-            bar = None
-            if kind == mujoco.mjtTrn.mjTRN_SITE:
-                bar = seen.loop.bars[model.site_bodyid[number]]
-            if kind == mujoco.mjtTrn.mjTRN_JOINT:
-                if number in self.pins and seen.is_alone:
-                    pin = self.pins[number]
+            if on_bar := dict(self.read_loads(i, bias)):
+                for key, load in on_bar.items():
+                    loads.setdefault(key, {})[element] = load
+            elif kind == mujoco.mjtTrn.mjTRN_JOINT:
+                if pin := self.pins.get(number):
                     self.put(f"pins.{pin}.motor", seen.sense[pin] * exerted, element)
             elif kind == mujoco.mjtTrn.mjTRN_TENDON:
                 if seen.touches_tendon(number):
                     self.put(f"{self.name_tendon(number)}.tension", exerted, element)
-            elif bar in MOVING_BARS:
-                key, load = self.read_load(i, bar, bias[0])
-                sums[key] = sums.get(key, np.zeros(5)) + load
             elif seen.is_alone:
                 words = "acts on no pin, bar or tendon"
                 self.put(f"actuators.{model.actuator(i).name or i}", words, element)
-        for key, total in sums.items():
-            fx, fy, couple, turning, along = total.tolist()
-            squared = fx * fx + fy * fy
-            x = y = 0.0
-            if squared:
-                x = (fx * along + fy * turning) / squared
-                y = (fy * along - fx * turning) / squared
-                turning = 0.0
-            self.put(f"{key}.force", (fx, fy))
-            self.put(f"{key}.point", (x, y))
-            self.put(f"{key}.couple", couple + turning)
+        for key, on_bar in loads.items():
+            element = ", ".join(on_bar)
+            fx, fy, couple, along = np.sum([*on_bar.values()], axis=0)
+            if squared := fx * fx + fy * fy:
+                x = (fx * along + fy * couple) / squared
+                y = (fy * along - fx * couple) / squared
+                self.put(f"{key}.force", (fx, fy), element)
+                self.put(f"{key}.point", (x, y), element)
+            else:
+                self.put(f"{key}.couple", couple, element)
 
-    def read_load(
-        self, actuator: int, bar: int, size: float
-    ) -> tuple[str, tuple[float, ...]]:
-        """Return key and sums of what an actuator exerts at a site of a bar.
+    def read_loads(self, actuator: int, bias: Array) -> Iterator[tuple[str, Array]]:
+        """Yield key and sums of the couple and the force of an actuator on a bar.
 
-        The sums are force, couple, r x F and r . F, in N and N m.
+        The sums are force, couple or r x F, and r . F, in N and N m.
         """
         seen = self.seen
         model = self.model
+        kind = model.actuator_trntype[actuator]
+        pin = self.pins.get(model.actuator_trnid[actuator, 0], "")
+        on_ground = kind == mujoco.mjtTrn.mjTRN_JOINT and pin in _GROUND_PINS
+        if on_ground and not bias[1:].any():
+            size = seen.sense[pin] * model.actuator_gear[actuator, 0] * bias[0]
+            key = f"loads.{BAR_NAMES[PINS[pin][1]]}"
+            yield key, np.array([0.0, 0.0, size, 0.0])
+        if kind != mujoco.mjtTrn.mjTRN_SITE:
+            return
         site, frame = (int(index) for index in model.actuator_trnid[actuator])
+        bar = seen.loop.bars[model.site_bodyid[site]]
+        if bar not in MOVING_BARS:
+            return
         axes_of = frame if frame >= 0 else site
         axes = seen.data.site_xmat[axes_of].reshape(3, 3)
         gear = model.actuator_gear[actuator].reshape(2, 3)
-        force, couple = (axes @ one * size for one in gear)
+        force, couple = (axes @ one * bias[0] for one in gear)
+        if couple.any():
+            turning = np.array([0.0, 0.0, couple @ seen.normal, 0.0])
+            yield f"loads.{BAR_NAMES[bar]}", turning
+        if not force.any():
+            return
         bearer = seen.loop.bars[model.site_bodyid[axes_of]]
         directions = "world axes"
         if bearer in MOVING_BARS:
@@ -289,8 +303,8 @@ class _Description:
         else:
             fx, fy = seen.in_plane(force)
         x, y = seen.along_bar(bar, seen.data.site_xpos[site])
-        moments = float(couple @ seen.normal), x * fy - y * fx, x * fx + y * fy
-        return f"loads.{BAR_NAMES[bar]}, {directions}", (fx, fy, *moments)
+        sums = np.array([fx, fy, x * fy - y * fx, x * fx + y * fy])
+        yield f"loads.{BAR_NAMES[bar]}, {directions}", sums
 
     def name_tendon(self, number: int) -> str:
         """Return a tendon's name: its pins, or else the bars that it runs between."""
