@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from pytest import mark
 
-from fourbar import Bar, Friction, Gravity, Motion, Sweep, Viscous
+from fourbar import Bar, Friction, Gravity, Motion, Rise, Sweep, Viscous
 from fourbar.quantities import PIN_FORCES
 from fourbar.scene import command
 from fourbar_validation.check.check import Judgement
@@ -135,6 +135,20 @@ def test_a_table_by_time_is_late_or_its_crank_has_another_zero(
     assert first.text.endswith(said) and first.complete
 
 
+def test_forces_are_late_along_a_law_that_rests_at_its_ends(read):
+    law = Rise("345", ("120 deg", "0.8 s"), theta_2="20 deg", steps=24)
+    scene = replace(DAMPED, motion=Motion(law=law), effects=DAMPED.effects[:2])
+    at, times = command(scene).part(slice(21)), np.linspace(0.0, 0.8, 21)
+    fields = ("angle", "speed", "acceleration")
+    earlier = scene.motion.law.at(np.maximum(times - 0.002, 0.0))
+    at = at._replace(**dict(zip(fields, earlier, strict=True)))
+    late = FreeBody().answer(scene, at).quantities
+    for angles in ({}, {"theta_2": scene.motion.law.at(times)[0]}):
+        table = read(write(late, time=times, **angles))
+        first = Judgement(scene, table).explanations[0]
+        assert first.text == "2 ms late (forces of an earlier instant)"
+
+
 def test_another_speed_moves_every_row_of_a_table_by_time(read):
     at = command(DAMPED)._replace(angle=1.04 * THETA, speed=10.4)
     faster = FreeBody().answer(DAMPED, at).quantities
@@ -159,12 +173,13 @@ def test_each_force_has_its_own_frame_and_sign(read):
 
 
 @mark.parametrize(
-    "side, words", [(1.0, "counted to 180 deg"), (-1.0, ", on the other side")]
+    "branch, words", [(-1, "counted to 180 deg"), (1, ", on the other side")]
 )
-def test_transmission_angles_may_be_counted_to_180_deg(side, words, read):
-    numbers = answer()
-    angle = np.arccos(side * np.cos(numbers["theta_4"] - numbers["theta_3"]))
+def test_transmission_angles_may_be_counted_to_180_deg(branch, words, read):
+    scene = replace(DAMPED, motion=replace(DAMPED.motion, branch=branch))
+    numbers = FreeBody().answer(scene, command(scene)).quantities
+    angle = np.arccos(-branch * np.cos(numbers["theta_4"] - numbers["theta_3"]))
     assert angle.max() > math.pi / 2.0 > angle.min()
     table = read(write({"transmission": angle}, ["transmission"]))
-    first = Judgement(DAMPED, table).explanations[0]
+    first = Judgement(scene, table).explanations[0]
     assert first.text.endswith(words) and first.complete

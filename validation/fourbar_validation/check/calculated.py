@@ -261,7 +261,7 @@ def _find_late(judge: Judge) -> Iterator[Mistake]:
         at = drop_remainder(judge.at).with_arrays(partial(_shift, step, part))
         late = solve_other(text, judge.scene, at)
         edge = 0 if step == 1 else n - 1  # its number may be anything
-        mistake = late._replace(predict=partial(free_edge, judge, late, edge))
+        mistake = late._replace(predict=partial(_free_edge, judge, late, edge))
         yield mistake
         yield mistake.within(FORCE_NAMES, " (forces alone)")
         if part == 1.0:
@@ -278,7 +278,9 @@ def _shift(step: int, part: float, values: Any) -> Any:
     return values + part * (shifted - values)
 
 
-def free_edge(judge: Judge, mistake: Mistake, edge: int, quantity: str) -> Array | None:
+def _free_edge(
+    judge: Judge, mistake: Mistake, edge: int, quantity: str
+) -> Array | None:
     """Return the numbers of a mistake, at one row those of the table."""
     return take_theirs(judge, mistake.predict(quantity), quantity, lambda _: [edge])
 

@@ -20,7 +20,7 @@ from fourbar.quantities.units import find_factor
 from fourbar.scene import Command, Scene
 from fourbar.solution import find_unit_of_quantity
 from fourbar.studies.keys import replace_numbers
-from fourbar_validation.check.calculated import free_edge, join
+from fourbar_validation.check.calculated import join
 from fourbar_validation.check.judge_table import Judge, JudgedColumn, compute_column
 from fourbar_validation.check.theirs import OTHER_UNITS
 from fourbar_validation.check.wrong_scenes import (
@@ -425,9 +425,7 @@ def _delay(
         mistake, of = mistake.within(FORCE_NAMES), "forces"
     when = ("late", "an earlier") if late > 0.0 else ("early", "a later")
     text = f"{abs(late):.6g} ms {when[0]} ({of} of {when[1]} instant)"
-    first = 0 if late > 0.0 else len(at.angle) - 1
-    predict = partial(free_edge, judge, mistake, first)
-    return mistake._replace(text=text, predict=predict)
+    return mistake._replace(text=text)
 
 
 def _hasten(

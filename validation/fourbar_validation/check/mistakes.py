@@ -267,14 +267,12 @@ def explain(
     plain = [one for one in found if not one.text.endswith(FITTED)]
     most = max((len(one.quantities) for one in plain if one.whole), default=0)
     named = set().union(*(one.quantities for one in plain))
-
-    def adds(one: Explanation) -> bool:
-        """Tell whether a fitted number explains what no plain name does."""
-        if one.whole:
-            return len(one.quantities) > most
-        return not named.issuperset(one.quantities)
-
-    found = [one for one in found if one in plain or adds(one)]
+    found = plain + [
+        one
+        for one in found
+        if one not in plain
+        and (len(one.quantities) > most if one.whole else {*one.quantities} - named)
+    ]
     of_columns = [one.quantities for one in found if not one.whole]
     if len(set().union(*of_columns)) < least:
         found = [one for one in found if one.whole]

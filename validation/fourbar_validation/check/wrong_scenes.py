@@ -53,12 +53,10 @@ _INERTIAL = {
 """Factors on m a and I alpha of every bar, by the mistake behind them."""
 _GRAVITIES = (9.81, 9.80665, 9.8)
 """Gravity of textbooks and of simulators, m/s^2."""
-_DIRECTIONS = (-90.0, 0.0, 90.0, 180.0)
-"""Directions along an axis to which gravity may point, deg."""
 _DAMPING = ("viscous", "friction", "pin_friction")
 """Effects that oppose motion, which many a simulator leaves out together."""
 GRAVITY_ANGLE = "effects.gravity.1"
-"""Key of the direction of gravity, which has hypotheses of its own."""
+"""Key of the direction of gravity, which is fitted."""
 Numbers = dict[str, float]
 """Numbers of a scene by their keys."""
 
@@ -237,9 +235,6 @@ def _list_wrong_numbers(scene: Scene) -> Iterator[tuple[str, Numbers]]:
             yield f"{text}: {size} m/s^2", along_y
     with_ground = gravity.angle + scene.linkage.ground_angle
     yield "gravity is turned with the ground", {GRAVITY_ANGLE: with_ground}
-    for degrees in _DIRECTIONS:
-        angle = math.radians(degrees)
-        yield f"gravity points to {degrees:g} deg", {GRAVITY_ANGLE: angle}
 
 
 def _list_wrong_bars(scene: Scene) -> Iterator[tuple[str, Numbers]]:
