@@ -101,6 +101,14 @@ KINDS_OF_STEP: dict[str, dict[str, Any]] = {
 
 They are tried beside RK4 with tolerance 0, ten iterations and pads, which is "".
 """
+_MOST_TRIALS = 24
+"""Most runs in which one search looks for the fewest steps that serve."""
+_LEAST_GAIN = 0.8
+"""More steps that leave the error above this part of what it was have met a floor."""
+_CHEAPER = 0.97
+"""Part of the work below which a kind of step counts as cheaper. Less is the noise of
+its timing.
+"""
 
 
 @record
@@ -278,9 +286,7 @@ class _CheapestSearch:
         del steps_of[""]
         for name, seconds in sorted(steps_of.items(), key=lambda pair: pair[1]):
             cost = self.costs[name] = seconds / base
-            # part of the work below which a kind of step counts as cheaper; less is the
-            # noise of its timing
-            allowed = 0.97 * min(map(self._work, self._list_served()))
+            allowed = _CHEAPER * min(map(self._work, self._list_served()))
             # with fewer steps than positions each step has a reading
             steps = max(
                 (allowed - start.readings * self.reading_cost) / cost,
@@ -309,7 +315,7 @@ class _CheapestSearch:
         serves: float | None = None
         fails: float | None = None
         last: SearchRun | None = None
-        for _ in range(24):
+        for _ in range(_MOST_TRIALS):
             attempt = self._try(n, tc, kind)
             ratio = attempt.errors.worst / (PART_OF_THE_ERROR * self.error)
             step = ratio ** (1.0 / ORDER_OF_RK4) if ratio < math.inf else 2.0
@@ -366,8 +372,10 @@ class _CheapestSearch:
 def _is_floored(before: SearchRun, after: SearchRun) -> bool:
     """Tell whether more steps bought nothing."""
     worst = after.errors.worst
-    # more steps that leave the error above this part of what it was have met a floor
-    return 0.8 * before.errors.worst < worst < 1e-2 and after.steps > 1.3 * before.steps
+    return (
+        _LEAST_GAIN * before.errors.worst < worst < 1e-2
+        and after.steps > 1.3 * before.steps
+    )
 
 
 def _find_speed_error(setup: TrialSetup, trial: Trial) -> float:

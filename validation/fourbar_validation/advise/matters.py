@@ -111,6 +111,10 @@ DEGREE_BETWEEN = 7
 """Degree of the curve through what was read at the steps. Its error falls faster with
 the steps than that of RK4.
 """
+NEAR_A_TOGGLE = 0.3
+"""Least |sin(theta_4 - theta_3)| at which the timestep does not feel bars 3 and 4.
+Below it they speed up too much.
+"""
 _MUJOCO_TOLERANCE = 1e-8
 """MuJoCo's own default."""
 
@@ -303,9 +307,7 @@ def _explain_timestep(
     motion = solve(setup.scene, "position", at=setup.command)
     nearest = int(np.nanargmin(np.abs(motion.sin_mu)))
     sine = abs(motion.sin_mu[nearest])
-    # least |sin(theta_4 - theta_3)| at which the timestep does not feel bars 3 and 4;
-    # below it they speed up too much
-    if sine < 0.3:
+    if sine < NEAR_A_TOGGLE:
         near = math.degrees(math.asin(sine))
         angle = math.degrees(setup.command.theta_2[nearest])
         return (

@@ -83,6 +83,12 @@ FIT_STEP = 1e-6
 """Step of the finite difference from which the fit finds its slope."""
 _IN_VAIN = 0.9
 """Part of a misfit that a step leaves of it, above which a fit is given up."""
+_NEARLY_ONE = 1e-3
+"""Distance from 1 below which five digits do not tell a ratio from it."""
+_PARTS_OF_A_STEP = (1.0, 0.25)
+"""Parts of a step of which the first that is nearer is taken: towards a speed that is
+many times ours the slopes lead too far.
+"""
 
 
 def find_fitted(judge: Judge, differing: list[JudgedColumn]) -> Iterator[Mistake]:
@@ -182,8 +188,7 @@ def _list_ratios(
     if numbers >= ENOUGH_NUMBERS:
         power = round(math.log10(near))
         yield f"every number is 10^{power} times ours", 10.0**power
-        # nearer to 1 five digits do not tell a ratio from it
-        digits = 5 if abs(near - 1.0) > 1e-3 else 12
+        digits = 5 if abs(near - 1.0) > _NEARLY_ONE else 12
         yield f"every number is {near:.{digits}g} times ours", near
 
 
@@ -309,8 +314,7 @@ def _fit(
         left = _find_size(here - slope * change)
         if family.of_ours and step == 0 and left > _IN_VAIN * size:
             return None
-        # towards a speed that is many times ours the slopes lead too far
-        for part in (1.0, 0.25):
+        for part in _PARTS_OF_A_STEP:
             tried = number - part * change
             there = measure(tried)
             if _find_size(there) < size:

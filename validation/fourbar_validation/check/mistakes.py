@@ -58,6 +58,10 @@ _WHERE = {
     " in what drives alone": tuple({*FORCE_NAMES} - {*PIN_FORCES}),
 }
 """Quantities in which a mistake may show, by what is added to its text."""
+_NEARLY_AT_REST = 1e-18
+"""Factor on a speed of which only the sign is left."""
+MOST_EXPLANATIONS = 5
+"""Explanations that are printed."""
 
 
 def list_column_mistakes(right: Solution) -> Iterator[Mistake]:
@@ -146,7 +150,7 @@ def _list_other_commands(scene: Scene, at: Command) -> Iterator[Mistake]:
     yield change(_OTHER_BRANCH, branch=-at.branch)
     if at.speed is not None:
         yield change("no inertial forces (statics)", speed=0.0, acceleration=0.0)
-        slow = 1e-18 * at.speed  # only the sign is left
+        slow = _NEARLY_AT_REST * at.speed
         text = "no inertial forces (statics), with friction"
         yield change(text, speed=slow, acceleration=0.0).within(FORCE_NAMES)
         yield change(f"{omega} is reversed", speed=-at.speed)
@@ -283,7 +287,7 @@ def explain(
     unlike: dict[object, Explanation] = {}
     for one in sorted(found, key=rank):
         unlike.setdefault((one.text, one.quantities), one)
-    return list(unlike.values())[:5]
+    return list(unlike.values())[:MOST_EXPLANATIONS]
 
 
 def _list_explained(

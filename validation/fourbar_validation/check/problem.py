@@ -45,6 +45,8 @@ SAFE = 8.0
 """Factor on the error bars of the formulas, which are estimates. Against many digits an
 answer is up to 6.6 of them off.
 """
+LARGEST_PROBLEM_FILE = 10**7
+"""Bytes."""
 
 
 class JudgedQuantity(NamedTuple):
@@ -83,7 +85,7 @@ def _read_document(
     path: str | Path, schema: str, objects: dict[str, str]
 ) -> dict[str, Any]:
     """Read an object of a schema, with what is said of entries that are no objects."""
-    text = read_text(path, "JSON file", 10**7)
+    text = read_text(path, "JSON file", LARGEST_PROBLEM_FILE)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -124,6 +124,14 @@ _HEADING = re.compile(
 """Heading of a column: a name, its unit in brackets or after a slash, and a component.
 The name may stand between bars.
 """
+_TWO_TURNS = 4.0 * math.pi
+"""Angles beyond this many rad, all of them multiples of half a one, are degrees."""
+_MOST_DEGREES = 1e6
+"""Beyond this no angle is meant."""
+_ROUNDED_HALVES = 1e-9
+"""Distance of a doubled angle from a whole number that its reading may leave."""
+LARGEST_TABLE_FILE = 64 * 2**20
+"""Bytes; a table larger than this is not a hand-made comparison."""
 
 
 @record
@@ -221,8 +229,7 @@ def read_table(
 
     `points`: names of places, velocities and accelerations of the scene's points.
     """
-    # a table larger than 64 MiB is not a hand-made comparison
-    text = read_text(path, "table", 64 * 2**20)
+    text = read_text(path, "table", LARGEST_TABLE_FILE)
     try:
         return _read_columns(*_read_lines(text, path.name), commanded, points)
     except InputError as error:
@@ -356,12 +363,12 @@ def _make_column(values: Array, half: Array, unit: Unit) -> TheirColumn:
 def _are_degrees(angles: Array) -> bool:
     """Return whether angles without a unit can be nothing but degrees.
 
-    They go beyond two turns in rad, and are multiples of half a degree.
+    Degrees go beyond two turns in rad, and are multiples of half a degree.
     """
     largest = np.abs(angles).max()
     halves = 2.0 * angles
-    in_range = 4.0 * math.pi < largest < 1e6  # beyond this no angle is meant
-    return bool(in_range and np.all(np.abs(halves - np.round(halves)) <= 1e-9))
+    missed = np.abs(halves - np.round(halves)).max()
+    return bool(_TWO_TURNS < largest < _MOST_DEGREES and missed <= _ROUNDED_HALVES)
 
 
 def _enter_column(

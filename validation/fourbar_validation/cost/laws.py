@@ -39,6 +39,15 @@ _FOURTH_ORDER = 4.0
 _EXPECTED_ORDER = dict.fromkeys(
     ("Euler", "implicit", "implicitfast", "discrete"), _FIRST_ORDER
 ) | {"RK4": _FOURTH_ORDER}
+_ABOVE_FLOOR = 3.0
+"""Points within this factor of the floor carry part of it and are not fitted."""
+FEWEST_FITTED = 3
+"""Points of a fit."""
+_LAWLESS_RISE = 10.0
+"""An error so many times larger than at either of the two coarser settings is no part
+of a law, where it has met no floor: between neighbours of a ladder the laws here change
+it by 10 or less, and downwards.
+"""
 
 
 @record
@@ -60,8 +69,7 @@ class ErrorLaw:
     @property
     def decided(self) -> bool:
         """Return whether there are enough points for a fit, or a jump rules it out."""
-        # points of a fit
-        return self.points >= 3 or bool(self.jumps)
+        return self.points >= FEWEST_FITTED or bool(self.jumps)
 
     @property
     def holds(self) -> bool:
@@ -136,10 +144,7 @@ def _describe_jumps(ladder: Sequence[CostPoint], quantity: str) -> Iterator[str]
         allowed = before
         if error < LARGEST_LAWFUL_ERROR:
             allowed = max(errors[max(i - 2, 0) : i])
-        # an error so many times larger than at either of the two coarser settings is no
-        # part of a law, where it has met no floor: between neighbours of a ladder the
-        # laws here change it by 10 or less, and downwards
-        if before < LARGEST_LAWFUL_ERROR and not error <= 10.0 * allowed:
+        if before < LARGEST_LAWFUL_ERROR and not error <= _LAWLESS_RISE * allowed:
             yield f"jumps from {before:.1e} to {error:.1e} at {ladder[i].setting}"
 
 
@@ -177,8 +182,7 @@ def _fit_law(
         floor = (find_floor(points, quantity) or 0.0) if by_steps else 0.0
         fitted = {}
         for point, error in zip(ladder, errors, strict=True):
-            # points within this factor of the floor carry part of it and are not fitted
-            if 3.0 * floor < error < LARGEST_LAWFUL_ERROR:
+            if _ABOVE_FLOOR * floor < error < LARGEST_LAWFUL_ERROR:
                 x = point.setting_value
                 fitted[1.0 / x if by_steps else x] = error
         slope = fit([*fitted], [*fitted.values()])

@@ -57,6 +57,12 @@ changes.
 """
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "discrete", "RK4")
 """Integrators, all that MuJoCo 4.0 has."""
+MOST_STEPS_TIMED = 200
+"""Steps per timing: some 3 ms of RK4. A round of a curve then passes within one spell
+of the machine.
+"""
+TIMED_READINGS = 50
+"""Readings per timing."""
 
 
 @record
@@ -360,11 +366,8 @@ class CostStudy:
         """
         kinds = [(spot.settings, spot.edit) for spot in spots]
         trials = [setup.try_out(*kind) for kind in kinds]
-        # steps per timing: some 3 ms of RK4; a round of a curve then passes within one
-        # spell of the machine
-        steps = [min(trial.steps, 200) or 1 for trial in trials]
-        # readings per timing
-        timings = time_kinds(setup, kinds, steps, 50, TIMINGS_OF_A_SETTING)
+        steps = [min(trial.steps, MOST_STEPS_TIMED) or 1 for trial in trials]
+        timings = time_kinds(setup, kinds, steps, TIMED_READINGS, TIMINGS_OF_A_SETTING)
         for spot, trial, timed in zip(spots, trials, timings, strict=True):
             (step, scatter), (reading, _) = map(summarise_timings, timed)
             seconds = step * trial.steps + reading * trial.readings

@@ -51,6 +51,21 @@ from fourbar_validation.engines.sliding import (
     solve_system,
 )
 
+_MEET = 16.0 * 2.0**-52
+"""Part of the lengths below which two points lie in one. The lengths are those by which
+they are reached.
+"""
+FOLLOWED = np.radians(2.0)
+"""Step in which angles are followed from where a motion begins, rad."""
+GREATEST_WINDING = math.pi * (1.0 - 1e-12)
+"""Greatest winding of a spring from rest, rad: half a turn less the rounding of an
+angle of several turns.
+"""
+_FRICTION_STARTS = 100
+"""Starts from which other solutions are sought, over six decades of couples."""
+SAME_SOLUTIONS = 1e-6
+"""Relative difference below which two solutions are one."""
+
 
 class BodyWrenches:
     """Sums of the forces (N) and moments (N m) on the moving bars, (n,) each.
@@ -148,11 +163,7 @@ def _add_spring_pulls(effect: Any, motion: BodyMotion, wrenches: BodyWrenches) -
                 + abs(spring.start.distance)
                 + abs(spring.end.distance)
             )
-            # part of the lengths below which two points lie in one; the lengths are
-            # those by which they are reached
-            distance = np.where(
-                np.abs(across) <= 16.0 * 2.0**-52 * reach, np.nan, np.abs(across)
-            )
+            distance = np.where(np.abs(across) <= _MEET * reach, np.nan, np.abs(across))
             tension = spring.preload + spring.stiffness * (distance - spring.length)
             if spring.acts == "push":
                 tension = np.minimum(tension, 0.0)
@@ -255,8 +266,7 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
     link = scene.linkage
     gone = np.zeros(len(motion.theta_2), dtype=bool)
     ends = np.concatenate((begins.theta_2, motion.theta_2))
-    # step in which angles are followed from where a motion begins, rad
-    steps = math.ceil(float(np.ptp(ends)) / np.radians(2.0)) + 1
+    steps = math.ceil(float(np.ptp(ends)) / FOLLOWED) + 1
     path = np.unique(np.concatenate((ends, np.linspace(ends.min(), ends.max(), steps))))
     closed = close(link, path, find_signs(link, path, scene.motion.branch))
     on_path = np.isin(begins.theta_2, path[closed.assembled])
@@ -272,9 +282,7 @@ def find_wound(scene: Scene, motion: BodyMotion) -> NDArray[np.bool_] | None:
         i, j = PINS[pin]
         away = theta[j] - theta[i] - rest
         turns = np.floor(away[first] / math.tau + 0.5)
-        # greatest winding of a spring from rest, rad: half a turn less the rounding of
-        # an angle of several turns
-        gone |= np.abs(away[places] - math.tau * turns) > math.pi * (1.0 - 1e-12)
+        gone |= np.abs(away[places] - math.tau * turns) > GREATEST_WINDING
     return gone
 
 
@@ -558,8 +566,7 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
     if np.abs(np.linalg.eigvals(k[:, None] * np.abs(C))).max() < 1.0:
         return 1
     rng = np.random.default_rng(0)
-    # starts from which other solutions are sought, over six decades of couples
-    n = 100
+    n = _FRICTION_STARTS
     size = float((k * np.abs(F)).max()) or 1.0
     x = (
         size
@@ -569,9 +576,8 @@ def _count_at_position(F: ComplexArray, C: ComplexArray, k: Array) -> int:
     x, settled, _ = solve_couples(np.tile(F, (n, 1)), np.tile(C, (n, 1, 1)), k, x)
     solutions: list[Array] = []
     for loads in x[settled & (x >= 0.0).all(axis=1)]:
-        # relative difference below which two solutions are one
         if all(
-            np.abs(loads - other).max() > 1e-6 * max(loads.max(), other.max())
+            np.abs(loads - other).max() > SAME_SOLUTIONS * max(loads.max(), other.max())
             for other in solutions
         ):
             solutions.append(loads)

@@ -26,6 +26,12 @@ NEARLY_IN_LINE = 2.0**-26
 """Least angle of the shorter bar with the diagonal at a start, rad: the gap there is as
 small as rounding.
 """
+ROUNDING_OF_FOUR_BARS = 16.0 * 2.0**-52
+"""Gap that the roundings of a sum of four bars can leave, relative to the sum of the
+lengths.
+"""
+_STROKE_HALVINGS = 80
+"""Number of times half a turn is halved: beyond the last digit of an angle."""
 
 
 class Closed(NamedTuple):
@@ -62,9 +68,7 @@ def close(
     diagonal = ground + held * np.exp(1j * theta)
     e = np.abs(diagonal)
     phi = np.angle(diagonal)
-    # gap that the roundings of a sum of four bars can leave, relative to the sum of the
-    # lengths
-    closed = 16.0 * 2.0**-52 * sum(linkage.lengths)
+    closed = ROUNDING_OF_FOUR_BARS * sum(linkage.lengths)
     # the gap is least where bars 3 and 4 lie along the diagonal
     least_gap = np.maximum(e - (b + c), abs(b - c) - e)
     possible = np.flatnonzero(least_gap <= closed)
@@ -191,8 +195,7 @@ def find_angle(
 
     low = np.zeros(len(wanted))
     high = np.full(len(wanted), np.pi)
-    # number of times half a turn is halved: beyond the last digit of an angle
-    for _ in range(80):
+    for _ in range(_STROKE_HALVINGS):
         middle = 0.5 * (low + high)
         short = np.abs(across(towards + sense * middle)) < wanted
         low = np.where(short, middle, low)

@@ -74,6 +74,8 @@ COMMANDED_NAMES = tuple(names[0] for names in protocol.KINDS_OF_COMMAND)
 _Read = TypeVar("_Read")
 Texts = tuple[str, ...]
 HELLO = {"ask": "hello", "protocol": protocol.PROTOCOL}
+LARGEST_ENGINES_FILE = 10**6
+"""Bytes."""
 
 
 @record
@@ -534,8 +536,7 @@ def read_engines(folders: Iterable[Path]) -> dict[str, EngineEntry]:
 
 def read_engines_of(file: Path) -> dict[str, EngineEntry]:
     """Read the engines of one file, by name."""
-    # bytes
-    text = read_text(file, "engines", 10**6)
+    text = read_text(file, "engines", LARGEST_ENGINES_FILE)
     entries: dict[str, EngineEntry] = {}
     try:
         for table in tomllib.loads(text).get("engine", []):

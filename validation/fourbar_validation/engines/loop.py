@@ -83,6 +83,10 @@ _CLOSING = {
 between them is the branch's, and they stand on the diagonal between their free ends as
 bars 3 and 4 do from A to O4; bar 2 from A back to O2.
 """
+ROUNDING_OF_THREE_BARS = 16.0 * 2.0**-52
+"""Gap that the roundings of a chain of three bars can leave, relative to the sum of the
+lengths.
+"""
 
 
 class Assembler:
@@ -104,9 +108,7 @@ class Assembler:
         self.closing = _CLOSING[bar]
         self.near, self.far = (abs(along[other]) for other in self.closing)
         lengths = abs(self.ground), abs(self.along), self.near, self.far
-        # gap that the roundings of a chain of three bars can leave, relative to the sum
-        # of the lengths
-        self.closed = 16.0 * 2.0**-52 * sum(lengths)
+        self.closed = ROUNDING_OF_THREE_BARS * sum(lengths)
 
     def find(self, theta: float, branch: int) -> JointAngles | None:
         """Return the joint angles on the branch, rad, None if the loop does not close.

@@ -147,6 +147,10 @@ class PinocchioTree(Tree):
 
 PinocchioInverse = partial(Exact, "pinocchio-inverse", PinocchioTree)
 RELEASED_NAME = "pinocchio-forward"
+BAUMGARTE_TIMESTEPS = 10.0
+"""Time constant of Baumgarte's stabilisation of a free motion, in timesteps: with 30
+the loop is lost at a change point from h = 5 ms on.
+"""
 PROXIMAL_SETTINGS = (1e-14, 1e-8, 10)
 """Accuracy, mu, iterations. With the default mu = 0 every acceleration is NaN: of the
 three rows of the closure only two are independent in the plane.
@@ -258,9 +262,7 @@ class PinocchioReleased:
         tree = PinocchioTree(scene)
         none = np.zeros(3)
         start = with_signs(scene.linkage, command(scene))
-        # time constant of Baumgarte's stabilisation of a free motion, in timesteps:
-        # with 30 the loop is lost at a change point from h = 5 ms on
-        loop = ClosedTree(tree, 10.0 * self.step)
+        loop = ClosedTree(tree, BAUMGARTE_TIMESTEPS * self.step)
         state = loop.start(
             float(start.theta_2[0]), int(start.branch[0]), scene.motion.omega_2 or 0.0
         )

@@ -33,6 +33,10 @@ from fourbar_validation.compare.rows import (
 
 WORKER_MEMORY = 8 * 2**30
 """Bytes of data of one process, a guest too; a scene takes a hundredth."""
+ENDING_SECONDS = 5.0
+"""Seconds for a program that is told to end; then it is killed."""
+_KILLED = (-9, 137)
+"""Exit status of a program that was killed: its own, or its shell's."""
 
 
 def bound_memory(process: int = 0) -> None:
@@ -504,8 +508,7 @@ class Running:
                 said += f" ({', '.join(place)})"
         else:
             said = ""
-        # exit status of a program that was killed: its own, or its shell's
-        if status in (-9, 137):
+        if status in _KILLED:
             return _KilledError(f"was killed{said}")
         if status >= 0:
             how = f"exit status {status}"
@@ -532,8 +535,7 @@ def _stop(process: "subprocess.Popen[bytes]") -> None:
     """End a program and what it started in its session."""
     _signal(process, "SIGTERM")
     with suppress(subprocess.TimeoutExpired):
-        # seconds for a program that is told to end; then it is killed
-        process.wait(5.0)
+        process.wait(ENDING_SECONDS)
     _signal(process, "SIGKILL")
     process.wait()
 

@@ -8,6 +8,13 @@ import numpy as np
 
 from fourbar.quantities import Array, ComplexArray, Mask
 
+_FRICTION_STEPS = 60
+"""Newton's steps in a stage; where it converges it needs a tenth of them."""
+_FRICTION_SETTLED = 8.0 * 2.0**-52
+"""Residual of a friction couple's equation, over the sum of its terms, that counts as
+rounding.
+"""
+
 
 def solve_refined(matrix: Array, right: Array) -> Array:
     """Solve linear systems by elimination and one step of refinement.
@@ -91,8 +98,7 @@ def solve_couples(
     settled = np.zeros(len(x), dtype=bool)
     matrix = np.empty((*x.shape, x.shape[-1]))
     left = np.arange(len(x))  # positions where a step is still to be taken
-    # steps of Newton in a stage; where it converges it needs a tenth of them
-    for _ in range(60):
+    for _ in range(_FRICTION_STEPS):
         load, adds, couples = F[left], C[left], x[left]
         force = load + (adds * couples[:, None, :]).sum(axis=-1)
         size = np.abs(force)
@@ -101,9 +107,7 @@ def solve_couples(
         matrix[left] = np.eye(len(k)) - slopes
         gap = k * size - couples
         terms = k * (np.abs(load) + (np.abs(adds) * couples[:, None, :]).sum(axis=-1))
-        # residual of a friction couple's equation, over the sum of its terms, that
-        # counts as rounding
-        settled[left] = (np.abs(gap) <= 8.0 * 2.0**-52 * terms).all(axis=1)
+        settled[left] = (np.abs(gap) <= _FRICTION_SETTLED * terms).all(axis=1)
         step = solve_system(matrix[left], gap[..., None])[0][..., 0]
         moving = ~settled[left] & np.isfinite(step).all(axis=1)
         left = left[moving]

@@ -66,6 +66,12 @@ moment), N and N m.
 Act = Callable[[], None]
 """Function that applies what acts on the bars at their present motion."""
 BarValues = dict[str, Array | Sequence[float] | float]
+FRICTION_PASSES = 100
+"""Passes over pin loads and the friction they make. Each lessens the error where the
+friction is far from a jam.
+"""
+_DIVERGED = 1e100
+"""Load, N, that only passes running away from each other reach."""
 
 
 class Assembled(Protocol):
@@ -272,15 +278,12 @@ class Loaded(Assembled, Protocol):
         if not self.loaded:
             return forces
         on_pins = without
-        # passes over pin loads and the friction they make; each lessens the error where
-        # the friction is far from a jam
-        for _ in range(100):
+        for _ in range(FRICTION_PASSES):
             before = loads
             loads = np.abs(on_pins)
             if np.abs(loads - before).max() <= REPEATED * loads.max():
                 return forces
-            # load, N, that only passes running away from each other reach
-            if not loads.max() < 1e100:
+            if not loads.max() < _DIVERGED:
                 break
             forces, on_pins = passed(loads)
         probe = float(np.abs(without).max())

@@ -34,6 +34,17 @@ _Submitted = tuple["Future[Any]", float]
 """An item's future, and when the item was handed in by the monotonic clock, s."""
 _Instead = Callable[[Any, BaseException, Attempt], Any]
 """Make the result of an item that failed: item, exception, how to try another one."""
+_IN_FLIGHT = 4
+"""Tasks submitted per worker: enough that it is always busy, few enough that the memory
+stays bounded.
+"""
+_LOCKED = 10.0
+"""Seconds for which a worker waits for the pipe that all workers share.
+
+A worker that is killed while it reads or writes there leaves the pipe locked for good:
+the others then wait twice as long, and the run ends and can be resumed. A message takes
+milliseconds.
+"""
 
 
 class NoWorkersError(DependencyError):
@@ -48,11 +59,7 @@ def prepare_worker(_: object = None) -> None:
     """
     from pebble import CONSTS
 
-    # seconds for which a worker waits for the pipe that all workers share; a worker
-    # that is killed while it reads or writes there leaves the pipe locked for good: the
-    # others then wait twice as long, and the run ends and can be resumed; a message
-    # takes milliseconds
-    CONSTS.channel_lock_timeout = 10.0
+    CONSTS.channel_lock_timeout = _LOCKED
     end_with_parent()
     open_no_windows()
     bound_memory()
@@ -163,9 +170,7 @@ def apply_over_processes(
             for number, items in tasks:
                 waiting = [items_of.submit(item) for item in items]
                 in_flight.append((number, items, waiting))
-                # tasks submitted per worker: enough that it is always busy, few enough
-                # that the memory stays bounded
-                if len(in_flight) > 4 * workers:
+                if len(in_flight) > _IN_FLIGHT * workers:
                     yield items_of.finish(*in_flight.popleft())
             for submitted in in_flight:
                 yield items_of.finish(*submitted)

@@ -27,6 +27,14 @@ from fourbar_validation.run.question import Question
 
 MOST_POSITIONS_SEARCHED = 400
 """Positions, in a row, by which a mistake is looked for."""
+MOST_POSITIONS_OF_FRICTION = 30
+"""The same, about the first that differs, where each trial looks for friction that
+balances the forces it follows.
+"""
+SAME_NUMBERS = 1e-9
+"""Part of a quantity's largest value within which a mistake must give an exact engine's
+numbers: it was made in another order of summation than the hypothesis.
+"""
 
 
 def find_causes(
@@ -44,9 +52,7 @@ def find_causes(
     if at is None or answer.assembled is None:
         return None
     scene = state_from_pins(question.scene)
-    # part of a quantity's largest value within which a mistake must give an exact
-    # engine's numbers: it was made in another order of summation than the hypothesis
-    slack = max(1e-9, tolerance.factor * (not tolerance.conditioned))
+    slack = max(SAME_NUMBERS, tolerance.factor * (not tolerance.conditioned))
     try:
         regular = question.solution.status_code == OK
 
@@ -62,9 +68,9 @@ def find_causes(
         labels = [column.label for column, rows in wrong.items() if rows.any()]
         if any(effect.loaded_pins for effect in scene.effects):
             any_wrong = np.logical_or.reduce(list(wrong.values()))
-            # positions about the first that differs: there each trial looks for
-            # friction that balances the forces it follows
-            judge, wrong = judge_rows(choose_rows(any_wrong, 30))
+            judge, wrong = judge_rows(
+                choose_rows(any_wrong, MOST_POSITIONS_OF_FRICTION)
+            )
         differing = [column for column, rows in wrong.items() if rows.any()]
         if not differing:
             return None

@@ -30,6 +30,10 @@ EXACT = "exact"
 """Setting of an engine whose errors are round-off."""
 CLOSES = "assembled"
 """Quantity of where the loop closes."""
+_TIMES_NEARER = 10.0
+"""Factor by which two engines are nearer to each other than to us if they agree against
+us: two that miss what they declare by as much do not.
+"""
 
 
 def compare_answers(question: Question) -> Iterator[Row]:
@@ -93,9 +97,7 @@ def _agree(question: Question, row: Row, other: Row) -> bool:
     (from_us,) = compute_difference(quantity, *here[:2])
     allowed = 2.0 * max(row.allowed, other.allowed)
     near = apart * row.error <= allowed * from_us
-    # factor by which two engines are nearer to each other than to us if they agree
-    # against us: two that miss what they declare by as much do not
-    return bool(near and apart * 10.0 <= from_us)
+    return bool(near and apart * _TIMES_NEARER <= from_us)
 
 
 def _values_of(question: Question, engine: str, quantity: str) -> Array | None:

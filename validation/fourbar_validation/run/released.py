@@ -73,6 +73,8 @@ RELEASED_ERRORS = {"theta_2": 1e-9, "omega_2": 1e-8, "energy": 1e-10}
 agrees: the formulas hold theta_2 to 1e-9 rad over 5 s; a motion of 100 s may amplify
 that by its duration, so 5 s is the unit.
 """
+DURATION_OF_FULL_ACCURACY = 5.0
+"""s; of a longer motion the errors grow with its duration."""
 
 
 def check_released(question: Question) -> Iterator[Row]:
@@ -283,7 +285,7 @@ def _make_rows(
         if len(other) >= n:
             expected = float(divide(np.abs(values[:n] - other[:n]).max(), size))
         full = RELEASED_ERRORS[name]
-        full *= max(1.0, free.duration / 5.0)
+        full *= max(1.0, free.duration / DURATION_OF_FULL_ACCURACY)
         reason = f"a free motion of {free.duration:g} s"
         if tolerance.factor > full:
             full, reason = tolerance.factor, tolerance.reason

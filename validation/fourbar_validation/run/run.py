@@ -70,6 +70,10 @@ REQUEST_FILE = "request.json"
 """File beside a part that says what was asked for, so that parts can be collected."""
 JUDGING, COLLECTING, DRAWING = "judging", "collecting", "drawing"
 """Stages of a run, as its progress is told."""
+_MOST_TASKS = 10_000
+"""Each has a file while the run goes on. Of a million scenes a hundred stand in one."""
+_MOST_KEPT_NAMED = 5
+"""Scenes whose kept answers a resumed run names; further ones are counted."""
 
 
 class Progress:
@@ -271,9 +275,7 @@ class Plan:
         count = len(self.suite)
         slow = self.draw_at_once or any(one.through_time for one in self.engines)
         least = SCENES_OF_A_SLOW_TASK if slow else SCENES_OF_A_QUICK_TASK
-        # each has a file while the run goes on; of a million scenes a hundred stand in
-        # one
-        size = max(least, math.ceil(count / 10_000))
+        size = max(least, math.ceil(count / _MOST_TASKS))
         scenes = range(count)
         return [scenes[start : start + size] for start in scenes[::size]]
 
@@ -319,8 +321,7 @@ class Plan:
 
     def _tell_kept(self, scenes: Sequence[int]) -> str:
         """Say which answers of an interrupted run are kept."""
-        # scenes whose kept answers a resumed run names; further ones are counted
-        names = [escape_controls(self.suite.name(i)) for i in scenes[:5]]
+        names = [escape_controls(self.suite.name(i)) for i in scenes[:_MOST_KEPT_NAMED]]
         more = len(scenes) - len(names)
         listed = ", ".join(names) + f" and {more} more" * bool(more)
         return (

@@ -121,6 +121,10 @@ _OTHER_END: dict[Any, Any] = {a: b for ends in _ENDS for a, b in (ends, ends[::-
 """Bars, pins and quantities by their names in a linkage read from its other end. The
 pin forces of bar 3 turn their signs there: F34 = -F43, F23 = -F32.
 """
+_AT_A_REVERSAL = 1e-3
+"""Part of its speeds below which a pin with dry friction may reverse."""
+POSITIONS_STATED_OTHERWISE = 5
+"""Positions of a scene that are stated otherwise."""
 
 
 @dataclass(frozen=True)
@@ -255,12 +259,11 @@ def _take_plain_positions(question: Question) -> _Few:
     in_line = link.ground_angle + np.array([0.0, math.pi])
     if scene.counts_turns and mark_touching(link, in_line).any():
         raise NotAskedError("rounding decides how far its torsion springs are wound")
-    # part of its speeds below which a pin with dry friction may reverse
     fit = (
         (solution.status_code == OK)
         & (solution.condition >= WELL_CONDITIONED)
         & (solution.drive_condition >= WELL_CONDITIONED)
-        & ~question.reversing(1e-3)
+        & ~question.reversing(_AT_A_REVERSAL)
     )
     posed = pose(link, [solution.theta_2, solution.theta_3, solution.theta_4])
     for effect in placed.effects:
@@ -273,8 +276,7 @@ def _take_plain_positions(question: Question) -> _Few:
     if not len(indices):
         raise NotAskedError("no position is well-conditioned")
     begin = int(np.argmax(solution.assembled))
-    # positions of a scene that are stated otherwise
-    chosen = spread_evenly(indices, 5)
+    chosen = spread_evenly(indices, POSITIONS_STATED_OTHERWISE)
     positions = np.concatenate([[begin], chosen[chosen != begin]])
     bars = [
         Bar(bar.length, find_mass(bar), find_inertia(bar), find_centre(bar))

@@ -43,6 +43,24 @@ FRICTION_ROWS = (
     mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON,
 )
 """Types of the constraints that are dry friction."""
+LARGEST_TRIAL = 1e8
+"""N m or N: beside a heavy flywheel a larger trial is no number for MuJoCo, which takes
+controls up to 1e10.
+"""
+_REFINEMENTS = 3
+"""Secant steps after the first: each gains the digits that the one before has."""
+_MISSED = 1e-9
+"""Part of the acceleration sought that a linear solve may leave. Its rounding is 1e-12,
+also near a change point.
+"""
+SOLVER_NOISE = 1e-3
+"""Part of it that the noise of the file's solver may leave. Where the acceleration
+jumps, all of it is left.
+"""
+_DOUBLINGS = 40
+"""Times that a trial's size is doubled in search of a couple, to both sides. Beyond
+1e12 times the size nothing is found.
+"""
 
 
 def merges_points(model: mujoco.MjModel) -> bool:
@@ -380,14 +398,9 @@ def find_couple(
     speed = float(np.abs(data.qvel).max())
     others = max(float(np.abs(data.qacc_smooth).max()), speed * speed) or 1.0
     sought = max(abs(wanted - free), LEAST_ACCELERATION * others)
-    # N m or N: beside a heavy flywheel a larger trial is no number for MuJoCo, which
-    # takes controls up to 1e10
-    trial = min(float(model.dof_M0.sum()) * sought, 1e8)
-    # secant steps after the first: each gains the digits that the one before has
-    couple = solve_couple(acceleration, wanted, 0.0, trial, 3)
-    # part of the acceleration sought that a linear solve may leave; its rounding is
-    # 1e-12, also near a change point
-    if couple is None or abs(acceleration(couple) - wanted) <= 1e-9 * sought:
+    trial = min(float(model.dof_M0.sum()) * sought, LARGEST_TRIAL)
+    couple = solve_couple(acceleration, wanted, 0.0, trial, _REFINEMENTS)
+    if couple is None or abs(acceleration(couple) - wanted) <= _MISSED * sought:
         return couple
     # the solver starts from the same accelerations at every trial, or its noise would
     # look like a jump
@@ -397,9 +410,7 @@ def find_couple(
         data.qacc_warmstart[:] = start
         return acceleration(size)
 
-    # part of it that the noise of the file's solver may leave; where the acceleration
-    # jumps, all of it is left
-    bracketed = bracket_couple(repeatable, wanted, trial, 1e-3 * sought)
+    bracketed = bracket_couple(repeatable, wanted, trial, SOLVER_NOISE * sought)
     if bracketed is None:
         return math.nan
     return bracketed
@@ -427,9 +438,7 @@ def bracket_couple(
     if sought == 0.0:
         return 0.0
     above = below = 0.0
-    # times that a trial's size is doubled in search of a couple, to both sides; beyond
-    # 1e12 times the size nothing is found
-    for doubling in range(40):
+    for doubling in range(_DOUBLINGS):
         size = abs(trial) * 2.0**doubling
         for nearer, farther in ((above, size), (below, -size)):
             if miss(farther) * sought <= 0.0:

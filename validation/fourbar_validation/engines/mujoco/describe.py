@@ -77,6 +77,8 @@ _MJCF_WORDS = {
 """Integrators and solvers as MJCF spells them, where MuJoCo spells them otherwise."""
 STIFFEST = 0.9999
 """Greatest impedance that MuJoCo lets a constraint have."""
+PARALLEL_AXES = 1e-9
+"""rad; axes that are nearer to each other are parallel but for rounding."""
 
 
 def describe_model(seen: SeenLoop, flywheel: float = 0.0) -> Described:
@@ -100,8 +102,7 @@ class _Description:
         self.described: Described = {}
         skew = seen.loop.misaligned
         self.put("plane", seen.plane)
-        # rad; axes that are nearer to each other are parallel but for rounding
-        self.put("skew", skew if skew > 1e-9 else 0.0)
+        self.put("skew", skew if skew > PARALLEL_AXES else 0.0)
         # those of a parallelogram or kite within the digits of the file, else its own
         lengths = seen.loop.met if seen.loop.rounding else seen.loop.lengths
         for name, length in zip(BAR_NAMES.values(), lengths, strict=True):

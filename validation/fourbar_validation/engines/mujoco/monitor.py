@@ -65,6 +65,10 @@ _LIMITS = {
     ),
 }
 """Greatest allowed value of each residual, and the reason."""
+_EXCUSED = 1e-3
+"""A solver's residual excuses an error of this part of a force, not more."""
+_ROUNDINGS = 4.0
+"""Roundings of the flywheel's torque, which is taken away from what drives it."""
 
 
 def list_alarms(
@@ -183,14 +187,12 @@ class ResidualMonitor:
             size = float(np.linalg.norm(seen.answer[name]))
             if name == COUPLE.value:
                 size = max(size, float(np.linalg.norm(seen.needed)))
-            # A solver's residual excuses an error of this part of a force, not more
-            expected[name] += min(error, 1e-3 * size)
+            expected[name] += min(error, _EXCUSED * size)
         # the drive does what the flywheel's torque leaves; their powers are compared
         flywheel = read.model.dof_armature[O2] * a[O2]
         with np.errstate(divide="ignore", invalid="ignore"):
             rounding = abs(float(flywheel / (seen.drive @ rates)))
-        # roundings of the flywheel's torque, which is taken away from what drives it
-        expected[self.drive] += 4.0 * EPS * rounding
+        expected[self.drive] += _ROUNDINGS * EPS * rounding
         return expected
 
     def _keep(

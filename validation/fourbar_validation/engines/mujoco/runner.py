@@ -56,6 +56,10 @@ them it hardly differs.
 
 ActuatorForce = Callable[[mujoco.MjModel, mujoco.MjData], float]
 """The force of an actuator, in units of its gear."""
+LIGHT_FLYWHEEL = 1e4
+"""Flywheel of the model that gives T3 or T4: heavy enough to keep the closure's
+softness small, light enough that the torque it needs does not drown in its rounding.
+"""
 
 
 class Segment:
@@ -267,10 +271,7 @@ class SimulatedRun:
         if course.scene.drive_bar != 2:
             flywheel = 0.0
             if settings.pad is not None:
-                # flywheel of the model that gives T3 or T4: heavy enough to keep the
-                # closure's softness small, light enough that the torque it needs does
-                # not drown in its rounding
-                flywheel = min(settings.flywheel, 1e4)
+                flywheel = min(settings.flywheel, LIGHT_FLYWHEEL)
             self.light = compile_loop(replace(settings, flywheel=flywheel))
         wound = unwind(course.scene, start)
         self.turns = wound[O2] - start[O2]
@@ -562,6 +563,11 @@ def supply_forces(supplied: dict[str, ActuatorForce]) -> Iterator[None]:
 
 RELEASED = "mujoco-forward"
 """Name of the engine."""
+CLOSURE_TIMESTEPS = 2.0
+"""Time constant of the loop's closure, in timesteps. Through change points the closure
+takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three hundred times as much
+with 10.
+"""
 
 
 class MujocoForward:
@@ -578,18 +584,14 @@ class MujocoForward:
         scene = state_from_pins(scene)
         setting = f"RK4 {self.step:g} s"
         start = with_signs(scene.linkage, command_of(scene))
-        interval = float(
-            times[1] - times[0]
-        )  # the times are evenly spaced; the step divides the interval
+        # the times are evenly spaced, and the step divides the interval
+        interval = float(times[1] - times[0])
         timestep = interval / math.ceil(interval / self.step - 1e-6)
-        # time constant of the loop's closure, in timesteps; through change points the
-        # closure takes energy out: 1e-6 of it in ten seconds at 1 ms with 2, three
-        # hundred times as much with 10
         settings = replace(
             RECIPE,
             flywheel=0.0,
             timestep=timestep,
-            time_constant_steps=2.0,
+            time_constant_steps=CLOSURE_TIMESTEPS,
             pad=None,
         )
         bare = replace(scene, motion=scene.motion.replace(free=None, acceleration=0.0))

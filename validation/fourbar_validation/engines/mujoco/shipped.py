@@ -36,6 +36,10 @@ SERVO_STEPS = 200
 """Timesteps after which the servo has brought the input to its speed, to e^-100. Its
 time constant is two steps.
 """
+SPEED_ERROR = 100.0 * SIMULATED.factor
+"""Allowed error of the speed, from loads and the closure in as many steps: ten times
+what was measured.
+"""
 
 
 def compare_shipped(
@@ -104,9 +108,7 @@ def compare_shipped(
             f"after {SERVO_STEPS} steps the input turns at {d.qvel[O2]:.6g} of"
             f" {due:.6g} rad/s"
         )
-        # allowed error of the speed, from loads and the closure in as many steps: ten
-        # times what was measured
-        allowed = 100.0 * SIMULATED.factor * max(abs(omega), abs(due))
+        allowed = SPEED_ERROR * max(abs(omega), abs(due))
         departures[reason] = math.inf if lost else missed / allowed
         if not departures[reason] <= 1.0:
             beyond = _find_excuse(scene, loop, fastest, lost=lost)

@@ -74,6 +74,8 @@ _RESIDUALS = (
     "solver_iterations",
     "steps",
 )
+LONGEST_STEP_OF_A_CHECK = np.radians(2.0)
+"""Greatest step between positions at which the loop is tried for closure, rad."""
 
 
 @record
@@ -266,8 +268,7 @@ class _Simulation:
     ) -> bool:
         """Tell whether the loop closes everywhere between two positions."""
         start, stop = self.command.angle[[one, second]]
-        # greatest step between positions at which the loop is tried for closure, rad
-        pieces = int(np.ceil(abs(stop - start) / np.radians(2.0)))
+        pieces = int(np.ceil(abs(stop - start) / LONGEST_STEP_OF_A_CHECK))
         branch = int(self.command.branch[one])
         return all(
             position.find(theta, branch) is not None

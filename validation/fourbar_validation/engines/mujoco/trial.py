@@ -72,6 +72,10 @@ _MOST_READINGS = 100
 """Readings that are timed at once, at most."""
 Edit = Callable[[str], str]
 """Function that changes the text of an MJCF."""
+MOST_SIMULATIONS = 6
+"""Simulations of a scene at most; the laws are seldom wrong by more than one."""
+PREDICTED_PART = 0.5
+"""The engine's own prediction must stay within this part of the wanted error."""
 
 
 def guess(error: float) -> tuple[float, float]:
@@ -329,16 +333,14 @@ class SimulatedToError:
         steps, tc = guess(self.error)
         spent = 0.0
         runs = 0.0
-        # simulations of a scene at most; the laws are seldom wrong by more than one
-        for _ in range(6):
+        for _ in range(MOST_SIMULATIONS):
             answer = MujocoSimulated(make_settings(steps, tc)).answer(scene, command)
             if answer.refusal is not None:
                 return answer
             spent += answer.evidence["steps"]
             runs += 1.0
             expected = compute_expected_error(scene, answer)
-            # the engine's own prediction must stay within this part of the wanted error
-            ratio = expected / (0.5 * self.error)
+            ratio = expected / (PREDICTED_PART * self.error)
             if ratio <= 1.0 and not answer.alarms:
                 break
             growth = _MOST_GROWTH
@@ -386,6 +388,10 @@ def compute_expected_error(scene: Scene, answer: Answer) -> float:
 
 INTERVALS_READ = 180
 """Intervals of the sweep at which a run is read at least."""
+DENSEST_INTERVALS = 16 * INTERVALS_READ
+"""Intervals beyond which steps are so dense that a curve of degree 7 through them is
+exact to round-off.
+"""
 
 
 class JudgedSetup(TrialSetup):
@@ -417,12 +423,7 @@ class JudgedSetup(TrialSetup):
 
     def try_out(self, settings: Settings, edit: Edit | None = None) -> Trial:
         """Run through the scene with as many positions as there are steps."""
-        # intervals beyond which steps are so dense that a curve of degree 7 through
-        # them is exact to round-off
-        if (
-            self.intervals > self.steps(settings)
-            or self.intervals >= 16 * INTERVALS_READ
-        ):
+        if self.intervals > self.steps(settings) or self.intervals >= DENSEST_INTERVALS:
             return super().try_out(settings, edit)
         if self._denser is None:
             self._denser = JudgedSetup(self.stated, 4 * self.intervals, self.before)
