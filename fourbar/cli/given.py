@@ -50,6 +50,8 @@ _KEYS_OF_A_SCENE = (
 
 scene_argument = click.argument("scene", type=FILE_PATH)
 TABLE_ENDINGS = (".txt", ".json")
+MOST_PRINTED = 1_000_000
+"""Positions that `analyze` prints: about a gigabyte of text."""
 
 
 def units_option(default: str = "those of the file") -> Callable[..., Any]:
@@ -140,8 +142,7 @@ def open_scene(path: Path) -> Iterator[Scene]:
         out = context.params.get("out")
         if out is not None:
             require_file(out, path)
-        # positions that `analyze` prints: about a gigabyte of text
-        require_steps(scene.motion, 1_000_000, "here", str(path))
+        require_steps(scene.motion, MOST_PRINTED, "here", str(path))
         try:
             yield scene
         except InputError as error:

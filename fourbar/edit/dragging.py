@@ -27,6 +27,8 @@ from fourbar.studies.keys import list_described
 
 _SAME_ANGLE = 1e-9
 """rad. Difference below which the position shown is the one that is drawn."""
+_LEAST_DIGITS = 1e-12
+"""Finest grain, relative to the number itself."""
 
 
 class _Handle(NamedTuple):
@@ -269,8 +271,7 @@ def put_number(
 
 def write_rounded(value: float, grain: float, unit: str) -> str:
     """Write a number with its unit, to the power of ten next below the grain."""
-    # finest grain, relative to the number itself
-    finest = max(grain, 1e-12 * abs(value), 1e-300)
+    finest = max(grain, _LEAST_DIGITS * abs(value), 1e-300)
     digits = -math.floor(math.log10(finest))
     shown = f"{round(value, digits):.{max(digits, 0)}f}"
     return f"{shown.rstrip('0').rstrip('.') if '.' in shown else shown} {unit}"

@@ -48,6 +48,8 @@ EXPORT_ENDINGS = {
 }
 """Ending of the file by the name of the format."""
 HARNESS_PACKAGE = "fourbar_validation"
+LAST_LINES = 30
+"""Lines of what the harness prints."""
 
 
 def evaluate_scene(
@@ -269,8 +271,7 @@ class HarnessRun:
             )
             printed, _ = await self.process.communicate()
             status = await self.process.wait()
-            # lines of what the harness prints
-            lines = printed.decode(errors="replace").splitlines()[:30]
+            lines = printed.decode(errors="replace").splitlines()[:LAST_LINES]
             about |= {"lines": lines, "stopped": status < 0, "status": status}
         except (DependencyError, OSError) as error:
             about["lines"] = [str(error)]

@@ -28,6 +28,8 @@ _OWN_PAGE = re.compile(
 )
 PATIENCE = 10.0
 """Time that a server may take from locking its page to writing it, s."""
+_LOCKED_BYTE = 1 << 30
+"""Byte of the page that Windows locks: far behind its text, which others read."""
 
 
 class Redirect:
@@ -119,9 +121,7 @@ def _lock(handle: int) -> bool:
         if sys.platform == "win32":
             import msvcrt
 
-            # byte of the page that Windows locks: far behind its text, which others
-            # read
-            os.lseek(handle, 1 << 30, os.SEEK_SET)
+            os.lseek(handle, _LOCKED_BYTE, os.SEEK_SET)
             msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
             os.lseek(handle, 0, os.SEEK_SET)
         else:

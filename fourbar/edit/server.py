@@ -42,6 +42,10 @@ looks for the server once a minute.
 """
 ERROR_BAR_DELAY = 0.15
 """s without a change, after which error bars follow."""
+SPREAD_DELAY = 1.0
+"""Time without a change after which the spreads of tolerances are sampled, s. Sampling
+takes seconds.
+"""
 
 
 class Workbench:
@@ -141,9 +145,7 @@ class Workbench:
             self.tell({"note": str(error)})
             return
         self.tell(about)
-        # time without a change after which the spreads of tolerances are sampled, s.
-        # Sampling takes seconds.
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(SPREAD_DELAY)
         await self._sample(state, data)
 
     async def _sample(self, state: SceneState, data: dict[str, Any]) -> None:

@@ -94,6 +94,8 @@ _ENDING_OF_PICTURE = {
 }
 Asked = dict[str, Any]
 """Request of a page, or a part of the answer to it."""
+LARGEST_STATE = 100_000_000
+"""Bytes of a state file."""
 
 
 class SceneState(NamedTuple):
@@ -148,8 +150,7 @@ class Session:
 
     def _resume(self) -> None:
         """Go on where an earlier session stopped."""
-        # bytes of a state file
-        data = read_bytes(self.state_file, "state file", 100_000_000)
+        data = read_bytes(self.state_file, "state file", LARGEST_STATE)
         try:
             state = {"pressure": ""} | json.loads(data)
             if state["schema"] != EDIT_SCHEMA:

@@ -55,6 +55,10 @@ _STANDS = 1e-12
 """Part of the largest velocity coefficient below which another one is rounding."""
 VANISHING_SPEED = 2.0**-300
 """Speed at which viscous damping vanishes and dry friction has its direction."""
+_SCIPY_LEAST = 100.0 * 2.0**-52
+"""Least relative tolerance that SciPy's constructor takes without a warning. The solver
+works with a smaller one.
+"""
 
 
 @dataclass(slots=True, eq=False)
@@ -357,8 +361,7 @@ class _Run:
             """SciPy's, with a smaller tolerance and a largest number of steps."""
 
             def __init__(self, *arguments: Any, **options: Any) -> None:
-                # SciPy's constructor warns of a smaller tolerance
-                super().__init__(*arguments, rtol=100.0 * 2.0**-52, **options)
+                super().__init__(*arguments, rtol=_SCIPY_LEAST, **options)
                 self.rtol = RELATIVE
 
             def step(self) -> Any:

@@ -35,6 +35,11 @@ from fourbar.scene.motion import (
 )
 from fourbar.solving import solve
 
+PINS_APART = 0.05
+"""Distance of the pins from the drawing, over the longest bar, above which no motion
+has that assembly.
+"""
+
 
 def from_pins(
     O2: tuple[Any, Any],
@@ -181,9 +186,7 @@ def choose_assembly(scene: Scene, drawing: DrawnPins) -> Scene:
     for pin, found in (("A", here.A), ("B", here.B)):
         drawn = np.subtract(drawing.place(pin), drawing.O2)
         gap += math.hypot(*(found[0] - drawn))
-    # distance of the pins from the drawing above which no motion has that assembly. It
-    # is a part of the longest bar.
-    if gap > 0.05 * max(scene.linkage.lengths):
+    if gap > PINS_APART * max(scene.linkage.lengths):
         raise InputError(
             f"motion.theta_{bar}",
             DRAWN_WORD,

@@ -118,6 +118,8 @@ _LIKE_A_SWEEP = re.compile(r"\d[^\d]*(\bto\b|\.\.|:|;)\s*-?\d")
 _A_POINT = "a force acts at a place: state point, from_pin or from_centre"
 MOST_POINTS_OF_A_SCENE = 1000
 """Limit of the points, each of which is three columns of every table."""
+LONGEST_SHOWN_LINE = 60
+"""Characters shown of a line that cannot be read."""
 
 
 def load(path: str | Path) -> Scene:
@@ -166,7 +168,8 @@ def parse_tables(text: str, name: str) -> dict[str, Any]:
         place = re.search(r"line (\d+)", reason)
         line = text.split("\n")[int(place[1]) - 1] if place else text
         allowed = f'{reason[:120]}; a number with a unit stands in quotes, like "9 in"'
-        raise InputError("TOML", line.strip()[:60], allowed, shown) from None
+        part = line.strip()[:LONGEST_SHOWN_LINE]
+        raise InputError("TOML", part, allowed, shown) from None
 
 
 def read_tables(document: dict[str, Any], name: str = "scene") -> Scene:

@@ -69,6 +69,8 @@ IMPERIAL = ("in", "inch", "inches", "ft", "foot", "feet", "yd", "yard", "yards")
 """Units of a length with which a scene is shown in imperial units, yards in feet."""
 UNIT_MISSING = "the unit is missing"
 """Reason of the error for a number alone."""
+_LONGEST_UNIT = 60
+"""Characters of a unit that are read: the library takes long over longer texts."""
 
 
 class UnitError(ValueError):
@@ -249,7 +251,7 @@ def ask_library(name: str) -> tuple[Fraction, dict[str, Fraction]]:
     Raises UnitError for what is no unit.
     """
     name = _JOINED.sub(" ", name.rstrip("."))
-    if len(name) > 60 or not UNIT_TEXT.fullmatch(name):
+    if len(name) > _LONGEST_UNIT or not UNIT_TEXT.fullmatch(name):
         raise UnitError("the unit cannot be read")
     registry = _load_registry()
     if angle := _PREFIXED_ANGLE.search(name):

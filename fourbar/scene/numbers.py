@@ -34,7 +34,12 @@ from fourbar.quantities import DERIVED_NAMES, UNITS, find_derived
 from fourbar.scene.drawing import DRAWN_PLACE, DRAWN_WORD, DrawnPins
 from fourbar.scene.motion import Motion
 
-_POINT_NAME = re.compile("(?!v_|a_)[a-z_][a-z_0-9]{,39}", re.IGNORECASE | re.ASCII)
+_POINT_NAME = re.compile("(?!v_|a_)[A-Za-z_][A-Za-z_0-9]*")
+"""Word that names a point: its velocity and acceleration begin with v_ and a_."""
+_THREE_SIGMA = 3.0
+"""Half width of a normal distribution in a worst case, in standard deviations."""
+LONGEST_POINT_NAME = 40
+"""Characters of the name of a point, which heads columns of tables."""
 
 
 @record
@@ -57,7 +62,8 @@ class Point(Placed):
     stated_at = "points.{0.name}"
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and _POINT_NAME.fullmatch(self.name)):
+        is_word = isinstance(self.name, str) and _POINT_NAME.fullmatch(self.name)
+        if not is_word or len(self.name) > LONGEST_POINT_NAME:
             allowed = (
                 "must be a word of letters, digits and _, not beginning with a digit,"
                 " v_ or a_"
@@ -193,5 +199,5 @@ class Tolerance:
     def reach(self) -> float:
         """The largest change that a worst case counts with."""
         if self.sigma:
-            return 3.0 * self.width  # three standard deviations
+            return _THREE_SIGMA * self.width
         return self.width

@@ -34,6 +34,10 @@ ALLOWED_PICTURE = (
     "must be the name of a PNG or JPEG file next to the scene file or below its folder,"
     ' like "coupler.png"'
 )
+LONGEST_FILE_NAME = 200
+"""Characters of a file's name: file systems take some 255 bytes."""
+LONGEST_SVG_HEAD = 2000
+"""Bytes within which an SVG file has its first tag."""
 
 
 class _PictureFile:
@@ -52,7 +56,11 @@ class _PictureFile:
             part not in ("", ".", "..") and not set(part) & set('\\:*?"<>|')
             for part in parts
         )
-        if not plain or not self.name.isprintable() or len(self.name) > 200:
+        if (
+            not plain
+            or not self.name.isprintable()
+            or len(self.name) > LONGEST_FILE_NAME
+        ):
             raise InputError(self.key, self.name, ALLOWED_PICTURE)
 
     def find_file(self) -> Path:
@@ -162,7 +170,7 @@ def read_picture(
     for magic, kind in _RASTER.items():
         if content.startswith(magic):
             return content, kind
-    if "SVG" in allowed and b"<svg" in content[:2000]:  # its first tag
+    if "SVG" in allowed and b"<svg" in content[:LONGEST_SVG_HEAD]:
         return content, "image/svg+xml"
     raise InputError(key, shown, f"must be a {allowed} picture")
 

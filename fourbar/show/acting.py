@@ -21,6 +21,15 @@ from fourbar.solving import solve
 from fourbar.studies.course import MotionCourse, Stretch, list_stretches
 from fourbar.studies.passing import SAME_POSITION
 
+_INSTANTS_OF_AN_END = 33
+"""Instants of an interval of a table at which two choices of its ends are compared. The
+difference of two cubics has one maximum in it.
+"""
+AT_END_OF_STROKE = 1e-6
+"""Part of a gas spring's length within which it is at its end. A scene that states the
+end as a place has fewer digits than that.
+"""
+
 
 def list_notes(solution: Solution, units: Conversion) -> list[str]:
     """List the remarks on what a scene states, and on what acts at its positions.
@@ -101,9 +110,7 @@ def _list_law_notes(scene: Scene, units: Conversion) -> list[str]:
     t = np.array(law.time)
     if len(t) < FEWEST_POINTS["free"]:
         return []
-    # instants of an interval of a table at which two choices of its ends are compared.
-    # The difference of two cubics has one maximum in it
-    ends = np.linspace(t[[0, -2]], t[[1, -1]], 33).ravel()
+    ends = np.linspace(t[[0, -2]], t[[1, -1]], _INSTANTS_OF_AN_END).ravel()
     pairs = zip(law.at(ends), replace(law, ends=other).at(ends), strict=True)
     angle, _, acceleration = (float(np.abs(one - two).max()) for one, two in pairs)
     assumed = "as the next intervals bend" if law.ends == "free" else "at rest"
@@ -221,9 +228,7 @@ def _list_ends(spring: Spring) -> list[tuple[float, float, float, str]]:
         if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:
             return [(1.0, -spring.slack / spring.stiffness, 0.0, "")]
         return []
-    # part of a gas spring's length within which it is at its end. A scene that states
-    # the end as a place has fewer digits than that
-    room = 1e-6 * spring.length
+    room = AT_END_OF_STROKE * spring.length
     folded = spring.length - spring.stroke
     return [
         (1.0, spring.length, room, "longer than its extended"),

@@ -81,6 +81,16 @@ _BENDING = [f"bending_{bar}" for bar in MOVING_BARS]
 """Names of the curves of the bending moments."""
 BARS_IN_LINE = {2: "3 and 4", 3: "2 and 4", 4: "2 and 3"}
 """Bars that are in line where a command of a bar, or a drive on it, loses digits."""
+LEAST_COLUMN = 12
+"""Least width of a column."""
+_HALF_OF_LAST = 0.5
+"""Part of the last digit shown from which on an error bar changes it."""
+_BESIDE_CHANGE_POINT = 1e-9
+"""rad; an angle nearer to a change point is rounded from it: files state angles with
+nine decimals and more.
+"""
+_NO_ANGLE = 1e-14
+"""rad; rounding of an angle of a turn."""
 
 
 class SceneBlock(Facts):
@@ -204,8 +214,7 @@ class SceneBlock(Facts):
         return f"{self.symbol}{_NBSP}={_NBSP}{text}" if named else text
 
     def _angle(self, angle: float) -> str:
-        # rad; rounding of an angle of a turn
-        return self._value(0.0 if abs(angle) < 1e-14 else angle, "rad")
+        return self._value(0.0 if abs(angle) < _NO_ANGLE else angle, "rad")
 
     def _write_head(self) -> Iterator[str]:
         """Write what the linkage is: type, title, branch, lengths, change points."""
@@ -247,9 +256,7 @@ class SceneBlock(Facts):
         """Write how many positions have which status, where one is not ok."""
         codes = self.solution.status_code
         away = self._measure_to_change_points()
-        # rad; an angle nearer to a change point is rounded from it: files state angles
-        # with nine decimals and more
-        beside = (codes == OK) & (away <= 1e-9)
+        beside = (codes == OK) & (away <= _BESIDE_CHANGE_POINT)
         words = [name.replace("_", " ") for name in STATUS_NAMES]
         words[CHANGE_POINT] = "at a change point"
         furthest = self._angle(float(np.max(away, where=beside, initial=0.0)))
@@ -739,8 +746,7 @@ class SceneBlock(Facts):
             below = "zero"
             if self.error:
                 below = f"below 1e{math.ceil(math.log10(self.error)):+03d}"
-            # part of the last digit shown from which on an error bar changes it
-            last_digit = 0.5 * 10.0 ** (1 - self.digits) / 10.0
+            last_digit = _HALF_OF_LAST * 10.0 ** (1 - self.digits) / 10.0
             changed = "none of these" if self.error < last_digit else "some"
             yield (
                 f"rounding changes {changed} digits (worst error bar {below} of the"
@@ -807,8 +813,7 @@ def _align(rows: list[tuple[str, list[str]]], most: int) -> list[str]:
 
     Cells beyond so many columns follow in further rows of the same labels.
     """
-    # least width of a column
-    width = max(12, 2 + max(len(cell) for _, cells in rows for cell in cells))
+    width = max(LEAST_COLUMN, 2 + max(len(cell) for _, cells in rows for cell in cells))
     fitting = max(1, (most - INDENT + 2) // width)
     return [
         f"{label:<{INDENT}}{''.join(f'{cell:<{width}}' for cell in part)}".rstrip()

@@ -25,6 +25,10 @@ _ONE_SIDE = np.array([1.0, 2.0, 3.0, 2.0, 4.0, 6.0])
 MULTIPLES = np.concatenate([-_ONE_SIDE, _ONE_SIDE])
 """Multiples of the step on both sides, by side, parabola and place."""
 _RISING, _ORDER = np.unique(MULTIPLES, return_inverse=True)
+SAME_LIMIT = 1e-6
+"""Part of the forces within which four extrapolations are one limit: as is shown."""
+ZERO_LIMIT = 1e-9
+"""Part of the forces below which a limit is zero."""
 
 
 def find_limits(solution: Solution) -> tuple[Solution, str]:
@@ -127,8 +131,6 @@ def _extrapolate_forces(
     extrapolations = 3.0 * first - 3.0 * second + third
     distance = np.ptp(extrapolations, axis=(1, 2)).max(axis=-1)
     limits = extrapolations[:, :, 0].mean(axis=1)
-    # part of the forces below which a limit is zero
-    limits[np.abs(limits) <= 1e-9 * size] = 0.0
-    # part of the forces within which four extrapolations are one limit: as is shown
-    limits[~(distance <= 1e-6 * size)] = np.nan
+    limits[np.abs(limits) <= ZERO_LIMIT * size] = 0.0
+    limits[~(distance <= SAME_LIMIT * size)] = np.nan
     return np.asarray(limits)

@@ -11,6 +11,14 @@ from fourbar.solution import Solution
 
 _BESIDE = 1e-6
 """Part of a law's time from an instant at rest to where it is told how it moves."""
+_SAME_RATE = 1e-9
+"""Difference of two rates of a spline that is round-off, over its largest value. The
+rounding is that of its coefficients.
+"""
+_BEGINNING = 1e-100
+"""Speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction has
+its sign.
+"""
 
 
 class Driving(NamedTuple):
@@ -100,9 +108,7 @@ def find_senses(solution: Solution) -> Array:
 
 def begin_to_move(speed: Any, senses: Any) -> Any:
     """Return speeds of which those that are 0 begin in a sense, 1 or -1; 0: none."""
-    # speed of what begins to move, rad/s or m/s. Its square is nothing; dry friction
-    # has its sign
-    return np.where(speed == 0.0, 1e-100 * senses, speed)
+    return np.where(speed == 0.0, _BEGINNING * senses, speed)
 
 
 def leaves_range(solution: Solution) -> Any:
@@ -133,10 +139,8 @@ def is_once_round(solution: Solution) -> bool:
     if turns <= 0.5 or not np.isclose(turns, np.round(turns), rtol=1e-12, atol=0.0):
         return False
     rates = (solution.at.speed, solution.at.acceleration)
-    # difference of two rates of a spline that is round-off, over its largest value. The
-    # rounding is that of its coefficients
     return all(
-        abs(rate[-1] - rate[0]) <= 1e-9 * np.abs(rate).max()
+        abs(rate[-1] - rate[0]) <= _SAME_RATE * np.abs(rate).max()
         for rate in rates
         if isinstance(rate, np.ndarray) and rate.ndim
     )

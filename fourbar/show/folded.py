@@ -10,6 +10,9 @@ from rich.table import Column, Table
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
 
+_ANY_WIDTH = 10_000
+"""Characters of a line that no table fills."""
+
 
 class FoldedTable(Table):
     """A table that is printed as several where it is wider than its console.
@@ -37,7 +40,7 @@ class FoldedTable(Table):
 
         One of two columns is not split, and rich breaks the words in it.
         """
-        wide = options.update_width(10_000)
+        wide = options.update_width(_ANY_WIDTH)
 
         def measure(*columns: Column) -> int:
             return Measurement.get(console, wide, self._keep([*columns])).maximum

@@ -43,6 +43,8 @@ USUAL = 90.0
 """Percentile of a column's sizes other than zero, and of its distances from the
 median. A spring that only pushes may exert no force at nearly all positions.
 """
+JUMP = 1e-3
+"""Part of its change over an interval by which a column jumps at one place in it."""
 
 
 def locate(scene: Scene, name: str, text: str) -> Command:
@@ -211,8 +213,7 @@ class _LocatedSearch:
         root = find_root(self._gap, interval, args=(value,))
         change = np.abs(after - before)[rows]
         left = np.abs(root.f_bracket[1] - root.f_bracket[0])
-        # part of its change over an interval by which a column jumps at one place in it
-        steady = (root.f_x == 0.0) | (left <= 1e-3 * change)
+        steady = (root.f_x == 0.0) | (left <= JUMP * change)
         # at a pole itself there is no value
         jumps = np.mean(root.bracket, axis=0)[~steady]
         return root.x[steady], jumps

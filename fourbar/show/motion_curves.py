@@ -56,6 +56,16 @@ those at a quarter of it, rad. Positions have some 12 digits there.
 """
 _Named = list[tuple[float, str]]
 """Places with the name of what happens there."""
+_BESIDE_A_BREAK = 1e-6
+"""Part of the motion from a break to where its sides are shown. A law that comes to
+rest by a square still moves there.
+"""
+_NO_BENDING = 1e-13
+"""Bending moment that is round-off, over the pin forces times the longest bar."""
+_HALF_A_TURN = 1e-6
+"""Part by which half a turn between two ranges of angles may be more, and is no turn.
+An end in its last digits leaves some 1e-8.
+"""
 
 
 @dataclass
@@ -108,9 +118,7 @@ class MotionCurves:
             return self.solution
         peaks = map(self.find_peak, panels.curves)
         tops = [peak.place for peak in peaks if math.isfinite(peak.value)]
-        # part of the motion from a break to where its sides are shown. A law that comes
-        # to rest by a square still moves there
-        away = 1e-6 * panels.length
+        away = _BESIDE_A_BREAK * panels.length
         stated = self.solution.at.places
         found = np.concatenate([tops, self.breaks - away, self.breaks + away])
         places = np.union1d(stated, np.clip(found, stated.min(), stated.max()))
@@ -536,8 +544,7 @@ def compute_bending(solution: Solution) -> dict[int, Bending]:
     for bar in MOVING_BARS:
         largest = largest_bending(scene, solution, bar)
         # a two-force bar has none
-        # bending moment that is round-off, over the pin forces times the longest bar
-        is_round_off = np.abs(largest.moment) <= 1e-13 * size
+        is_round_off = np.abs(largest.moment) <= _NO_BENDING * size
         moment = np.where(is_round_off, 0.0, largest.moment)
         bending[bar] = largest._replace(moment=moment)
     return bending
@@ -609,8 +616,6 @@ def _join_turns(panels: Panels, solution: Solution, bar: int) -> None:
         ends = ends_of.get(numbers[stretch[0]], angles[stretches[0]])
         away = 0.5 * (ends.min() + ends.max()) - 0.5 * (part.min() + part.max())
         # half a turn away is no turn, whatever the rounding
-        # part by which half a turn between two ranges of angles may be more, and is no
-        # turn. An end in its last digits leaves some 1e-8
-        angles[stretch] += TURN * np.round((1.0 - 1e-6) * away / TURN)
+        angles[stretch] += TURN * np.round((1.0 - _HALF_A_TURN) * away / TURN)
         ends_of[numbers[stretch[0]]] = np.append(ends, angles[stretch])
     curve.values = angles.reshape(curve.values.shape)

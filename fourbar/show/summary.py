@@ -38,6 +38,12 @@ ZERO_TRANSMISSION_ANGLE = 1e-6
 """Transmission angle that counts as zero, rad. At a limit, a place in its last digits
 leaves some 1e-8.
 """
+_INSET = 1e-9
+"""Angle that is left out of a range at its limit positions, rad. These may not assemble
+as doubles.
+"""
+_STEPS_OF_RANGE = 48
+"""Steps of the range of a bar in which a single position lies."""
 
 
 class BarBending(NamedTuple):
@@ -259,10 +265,8 @@ class Facts:
             return min(ranges, key=lambda ends: max(ends[0] - stroke, stroke - ends[1]))
         here = float(at.angle[first])
         linkage = scene.linkage
-        # angle that is left out of a range at its limit positions, rad. These may not
-        # assemble as doubles
-        low, high = choose_range(linkage, at.bar, here, 1e-9)
-        sweep = {f"theta_{at.bar}": Sweep(low, high, 48)}
+        low, high = choose_range(linkage, at.bar, here, _INSET)
+        sweep = {f"theta_{at.bar}": Sweep(low, high, _STEPS_OF_RANGE)}
         in_one_turn = count_turns(linkage.lengths, at.bar) == 1
         is_whole = turns_fully(linkage, at.bar) and in_one_turn
         strokes = []

@@ -20,6 +20,10 @@ SAME_PLACE = 1e-12
 Condition = Callable[[Solution], Mask]
 Stretch = tuple[float | None, float | None]
 """Places of the start and of the end; None: the motion begins or ends within."""
+HALVINGS_OF_A_STEP = 60
+"""Halvings of the distance between two samples down to its last digits."""
+INTERVALS = 2000
+"""Least number of intervals of a motion."""
 
 
 def list_stretches(
@@ -135,8 +139,7 @@ class MotionCourse:
         else:
             stated = command(self.scene).places
         steps = len(stated) - 1
-        # least number of intervals of a motion
-        parts = -(-2000 // max(steps, 1))
+        parts = -(-INTERVALS // max(steps, 1))
         rows = np.linspace(0.0, steps, parts * steps + 1)
         places = np.interp(rows, np.arange(steps + 1), stated)
         if motion.law is not None:
@@ -170,8 +173,7 @@ def bisect(
 
     The condition holds at the lower end of each interval alone.
     """
-    # halvings of the distance between two samples down to its last digits
-    for _ in range(60):
+    for _ in range(HALVINGS_OF_A_STEP):
         middle = 0.5 * (low + high)
         held = holds(middle)
         low = np.where(held, middle, low)

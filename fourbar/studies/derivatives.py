@@ -78,6 +78,8 @@ that, but none by the speed.
 """
 AT_FREE_LENGTH = "at_free_length"
 """Status where a spring that acts one way just comes off: slopes jump there."""
+_NO_INFLUENCE = 1e-13
+"""Change over the largest value of its quantity that is rounding."""
 
 
 class _Influence(NamedTuple):
@@ -199,8 +201,7 @@ class Sensitivity:
         part = f"|{quantity}|" if quantity in PIN_FORCES else quantity
         value, slopes = self.find(part)
         size = np.abs(value) if value.ndim == 1 else np.hypot(*value.T)
-        # change over the largest value of its quantity that is rounding
-        rounding = 1e-13 * np.nanmax(size, initial=0.0)
+        rounding = _NO_INFLUENCE * np.nanmax(size, initial=0.0)
         rows = []
         steps = map(self._find_step, self.keys.values(), self.numbers.tolist())
         for key, step, slope in zip(self.keys, steps, slopes, strict=True):

@@ -53,6 +53,20 @@ _A_JUMP = 1e-6
 """Fraction of the sum of the absolute terms above which a sign change is a jump. A
 torsion spring wound by half a turn makes Q jump, which is no zero.
 """
+STANDING_BAR = 1e-3
+"""Ratio of the turns of bars 2 and 4 below which bar 2 stands at a limit. theta_4 then
+takes the place of theta_2.
+"""
+ROUNDING_OF_A_SINE = 50.0 * 2.0**-52
+"""Sine between two bars, times that between bars 3 and 4, below which it is rounding.
+An angle of the input has 16 digits, and bars 3 and 4 lose what this sine is small by.
+"""
+SINE_AT_A_LIMIT = 2.0**-26
+"""Sine between bars 3 and 4 that a rounded angle of the input leaves at a limit."""
+_A_RANGE = 3
+"""Steps of the grid over which Q is nothing: fewer may be a zero that falls on one."""
+_AT_CHANGE_POINT = 1e-4
+"""rad; nearer to a change point nothing is decided: the curve crosses itself there."""
 
 
 class _CircuitRange(NamedTuple):
@@ -153,8 +167,7 @@ def equilibrium(scene: Scene) -> Equilibria:
         not_decided = list[RestPosition]()
         count = 0
         for curve in curves:
-            # fewer than 3 steps of the grid without Q may be a zero that falls on one
-            indifferent += _list_ranges(curve, curve.level, 3)
+            indifferent += _list_ranges(curve, curve.level, _A_RANGE)
             not_decided += map(curve.place, curve.singular)
             samples = curve.samples()
             count += len(samples)
@@ -250,8 +263,7 @@ def _describe_equilibrium(
     places = np.array([tau])
     points = curve.points(places)
     state = curve.state(points)
-    # where bar 2 stands at a limit, theta_4 takes the place of theta_2
-    bar = 4 if abs(state.k.h2[0]) < 1e-3 * abs(state.k.h4[0]) else 2
+    bar = 4 if abs(state.k.h2[0]) < STANDING_BAR * abs(state.k.h4[0]) else 2
     square = float(state.k[bar - 2][0]) ** 2
     along_curve = float(curve.slope(points)[0])
     moving = _drop_standing_bar(curve.lengths, state.k)
@@ -290,11 +302,8 @@ def _drop_standing_bar(lengths: Loop, k: Coefficients) -> Coefficients:
     h = np.array([k.h2, k.h3, k.h4])
     ratios = np.array([1.0, lengths.b / lengths.a, lengths.c / lengths.a])
     sines = np.abs(h * ratios[:, np.newaxis])
-    # sine between bars 3 and 4 that a rounded angle of the input leaves at a limit
-    lost_by = np.maximum(sines[0], 2.0**-26)
-    # an angle of the input has 16 digits, and bars 3 and 4 lose what the sine between
-    # them is small by
-    h[sines * lost_by < 50.0 * 2.0**-52] = 0.0
+    lost_by = np.maximum(sines[0], SINE_AT_A_LIMIT)
+    h[sines * lost_by < ROUNDING_OF_A_SINE] = 0.0
     return k._replace(h2=h[0], h3=h[1], h4=h[2])
 
 
@@ -377,8 +386,7 @@ def _find_zeros(curve: CircuitCurve, samples: Array) -> tuple[Array, Array]:
     sizes = np.append(sizes, size[continuous])
     for point in curve.singular:  # nothing moves there, so that Q vanishes
         away = np.abs(np.sin(0.5 * (curve.points(zeros) - point)))
-        # nearer than 1e-4 rad nothing is decided: the curve crosses itself there
-        apart = (away >= 1e-4).any(axis=1)
+        apart = (away >= _AT_CHANGE_POINT).any(axis=1)
         zeros = zeros[apart]
         sizes = sizes[apart]
     return zeros, sizes

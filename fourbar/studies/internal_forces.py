@@ -26,6 +26,13 @@ from fourbar.quantities import Array
 from fourbar.scene import Scene
 from fourbar.solution import Solution
 
+_STATIONS = 41
+"""Equal stations, where none are given."""
+SAME_FOOT = 1e-9
+"""Part of the bar's length within which two feet are one. A load and the inertia, both
+at G, differ by round-off.
+"""
+
 
 class Bending(NamedTuple):
     """Largest bending moment of a bar at each position."""
@@ -88,8 +95,7 @@ def internal_forces(
     feet = beam.foot[solution.assembled]
     first = np.nanmin(feet, initial=0.0)
     last = np.nanmax(feet, initial=beam.length)
-    # equal stations, where none are given
-    x = np.linspace(first, last, 41)
+    x = np.linspace(first, last, _STATIONS)
     if stations is not None:
         x = np.atleast_1d(
             require_numbers("stations", stations, "must be finite lengths", "m")
@@ -156,9 +162,7 @@ class _Beam:
         `side`: -1: without what acts at x itself.
         """
         foot = self.foot[:, :, None]
-        # part of the bar's length within which two feet are one. A load and the
-        # inertia, both at G, differ by round-off.
-        acts = foot < (x + side * 1e-9 * self.length)[:, None]
+        acts = foot < (x + side * SAME_FOOT * self.length)[:, None]
         force = np.where(acts, self.force[:, :, None], 0.0)
         couple = np.where(acts, self.couple[:, :, None], 0.0)
         s = np.clip(x, 0.0, self.length)

@@ -15,6 +15,16 @@ PARTS = 16
 """Parts into which a step is divided in a round: with n places at first an extreme is
 missed by the square of 1/(n PARTS^ROUNDS), which is round-off.
 """
+NEAREST = 1e-4
+"""Part of the path by which the places of a course may miss an extreme. It falls as
+the square of the steps.
+"""
+MOST_LINES = 300
+"""Directions of nearest lines that are told apart. A circle has more of them."""
+SAME_HEIGHT = 1e-13
+"""Part of the largest height by which others differ by rounding."""
+MOST_PLACES = 50_000
+"""Places from which on the steps are not divided: they are short all around."""
 
 
 class Path(NamedTuple):
@@ -64,10 +74,9 @@ def _measure_path(course: MotionCourse, name: str, circuit: int) -> Path:
     places = course.places
     points = _locate_point(course, name, circuit, places)
     for number in range(ROUNDS):
-        if len(places) > 50_000:  # the steps are short all around
+        if len(places) > MOST_PLACES:
             break
-        # part of the path by which an extreme may be missed, as the square of the steps
-        missed = 1e-4 * PARTS ** (-2.0 * number)
+        missed = NEAREST * PARTS ** (-2.0 * number)
         extremes = _list_extremes(points, missed)
         steps = np.unique([extremes - 1, extremes])
         steps = steps[(steps >= 0) & (steps < len(places) - 1)]
@@ -135,7 +144,7 @@ def _find_direction(points: Array, missed: float = 0.0) -> tuple[Array, list[int
     direction = along[np.argmin(widths)]
     room = missed * np.hypot(*np.ptp(corners, axis=0))
     near = np.flatnonzero(widths <= widths.min() + room)
-    if len(near) > 300:  # as of a circle: they are not told apart
+    if len(near) > MOST_LINES:
         return direction, hull.tolist()
     # what is no corner between these places may be one between closer ones
     heights = points @ normals[:, near] - bases[near]
@@ -176,7 +185,7 @@ def _list_first_ends(heights: Array, stated: Mask) -> list[int]:
     the motion or a part of it ends.
     """
     rows = []
-    rounding = 1e-13 * np.nanmax(np.abs(heights))
+    rounding = SAME_HEIGHT * np.nanmax(np.abs(heights))
     for sizes in (-heights, heights):
         tied = sizes >= np.nanmax(sizes) - rounding
         # the first of what is true: where the motion ends, or else any

@@ -42,6 +42,14 @@ PARTED = 0.1
 share of the larger: the quantity is no longer straight over the tolerances, and a share
 of a variance is that of a straight one.
 """
+_MOST_SAMPLES = 10_000_000
+"""Samples of a study: their angles and numbers take gigabytes."""
+_SEEDS = range(2**128)
+"""Whole numbers that seed a generator: it has 128 bits."""
+_NEGLIGIBLE = 1e-9
+"""Share of the quantity's largest value below which a deviation is rounding. It decides
+nothing then.
+"""
 
 
 class Spread(NamedTuple):
@@ -75,9 +83,7 @@ class Spread(NamedTuple):
         size = np.nanmax(np.abs(self.nominal), initial=0.0)
         apart = np.abs(self.deviation - self.first_order)
         differ = np.isfinite(self.deviation) & ~(apart <= PARTED * larger)
-        # share of the quantity's largest value below which a deviation is rounding. It
-        # decides nothing then.
-        return np.asarray(differ & (larger > 1e-9 * size))
+        return np.asarray(differ & (larger > _NEGLIGIBLE * size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,12 +167,11 @@ def tolerances(
     JCGM 100:2008, 5.1.2.
     """
     expect("scene", scene, Scene)
-    samples = Whole(2, 10_000_000).check("samples", samples)
+    samples = Whole(2, _MOST_SAMPLES).check("samples", samples)
     is_generator = isinstance(seed, np.random.Generator)
     if not is_generator:
         allowed = "must be a whole number, 0 or more, or a numpy.random.Generator"
-        # whole numbers that seed a generator: it has 128 bits
-        require_whole("seed", seed, range(2**128), allowed)
+        require_whole("seed", seed, _SEEDS, allowed)
     if not scene.tolerances:
         allowed = 'the scene states none; like [tolerances] "lengths.input" = "0.05 mm"'
         raise InputError("tolerances", None, allowed)

@@ -48,6 +48,12 @@ if TYPE_CHECKING:
 _DEGREES = {"rad": ("°", math.degrees(1.0))}
 Looks = dict[str, tuple[str, dict[str, Any]]]
 """Columns and the looks of their curves, by the label."""
+ORDINARY_PERCENTILE = 95.0
+"""Percentile of the magnitudes that counts as the ordinary size of a curve ..."""
+OUTLIER = 3.0
+"""... and the multiple of it that a curve must exceed to be clipped."""
+CLIPPED = 1.6
+"""A clipped axis ends at this multiple of the ordinary size."""
 
 
 class Chart(NamedTuple):
@@ -156,10 +162,9 @@ def choose_limit(values: Iterable[Array]) -> float | None:
     """Choose the end of a clipped axis; None if no value stands far out."""
     sizes = np.abs(np.concatenate([*values]))
     sizes = sizes[np.isfinite(sizes)]
-    # the ordinary size of a curve; one three times as large is clipped
-    ordinary = float(np.percentile(sizes, 95.0)) if sizes.size else 0.0
-    if sizes.max(initial=0.0) > 3.0 * ordinary > 0.0:
-        return 1.6 * ordinary
+    ordinary = float(np.percentile(sizes, ORDINARY_PERCENTILE)) if sizes.size else 0.0
+    if sizes.max(initial=0.0) > OUTLIER * ordinary > 0.0:
+        return CLIPPED * ordinary
     return None
 
 

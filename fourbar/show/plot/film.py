@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 FRAMES_PER_SECOND = 25
 _STAYS = 255
 """Colour, after those of the palette, of a pixel that a frame leaves as it was."""
+_MAX_FRAMES = 1500
+"""Frames of a film, one minute: more take long to draw and to open."""
+WINDOW_POSITIONS = 12
+"""Positions whose symbols the window is made to hold."""
+SHORTEST_FILM = 1.0
+"""A motion through time shorter than this, s, is slowed down to be seen."""
 
 
 def _find_ffmpeg() -> str:
@@ -60,7 +66,7 @@ def write_film(
     Raises DependencyError where matplotlib or, for MP4, ffmpeg with its H.264 encoder
     is missing.
     """
-    longest = 1500 / FRAMES_PER_SECOND
+    longest = _MAX_FRAMES / FRAMES_PER_SECOND
     if seconds is not None and not 0.0 < seconds <= longest:
         allowed = f"must be more than 0 and at most {longest:g}"
         raise InputError("seconds", seconds, allowed)
@@ -72,8 +78,7 @@ def write_film(
             seconds = 6.0  # of a film of a sweep
             if shown.time is not None:
                 duration = float(shown.time[-1] - shown.time[0])
-                # a motion through time shorter than 1 s is slowed down to be seen
-                seconds = min(max(duration, 1.0), longest)
+                seconds = min(max(duration, SHORTEST_FILM), longest)
         order = choose_frames(shown, max(2, round(seconds * FRAMES_PER_SECOND)))
         with tempfile.TemporaryDirectory() as folder:
             _write_gif(Path(folder, "film.gif"), _draw_frames(shown, order, moving))
@@ -207,7 +212,7 @@ def _make_stage(shown: View, moving: bool) -> "tuple[Figure, Callable[[int], Any
 
     closes = np.flatnonzero(sweep.assembled)
     # the window holds what acts at every position
-    for index in closes[:: max(1, len(closes) // 12)]:
+    for index in closes[:: max(1, len(closes) // WINDOW_POSITIONS)]:
         move(int(index))
     label_plane(axes, shown, "θ")
     place_legend(axes, 3)

@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
 
+STATIONS_DRAWN = 401
+"""Stations along a bar."""
+
 
 class Arrow(NamedTuple):
     """A force on a bar: its point and its vector, N.
@@ -167,7 +170,7 @@ def draw_internal_forces(figure: "SubFigure", view: View) -> None:
     facts = Facts(solution)
     for column, (bar, worst) in zip(panels.T, facts.bending.items(), strict=True):
         coarse = internal_forces(view.scene, worst.solution, bar).x
-        x = np.linspace(coarse[0], coarse[-1], 401)
+        x = np.linspace(coarse[0], coarse[-1], STATIONS_DRAWN)
         forces = internal_forces(view.scene, worst.solution, bar, x)
         factor, unit = choose_unit(float(x[-1]), "m", view.units)
         place = view.axis.words(float(worst.solution.at.places[worst.row]))

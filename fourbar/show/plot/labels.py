@@ -17,6 +17,20 @@ if TYPE_CHECKING:
 _IS_LABEL = "label"
 """Mark of the texts that are labels."""
 LABEL_DIRECTIONS = 24
+_NEAR = 10.0
+"""Distance of a label's middle from its point until it is settled. This and the other
+distances are in typographic points.
+"""
+_REACH = (7.0, 11.0, 16.0, 21.0)
+"""Distances from the point to the label's edge that are tried."""
+_MARGIN = 2.5
+"""Space around a label: half the width of a bar and a little more."""
+_INKED = 200
+"""Level of its darkest channel, of 255, below which a pixel is drawn on. Plates and
+grids are fainter, and may be covered.
+"""
+_CUT = 300.0
+"""Cost of a label that leaves its axes, in square points of what it covers."""
 
 
 def add_label(
@@ -36,7 +50,7 @@ def add_label(
     axes.annotate(
         text,
         split_complex(at),
-        split_complex(10.0 * towards),
+        split_complex(_NEAR * towards),
         textcoords="offset points",
         ha=sides[round(towards.real)],
         va="center",
@@ -67,8 +81,7 @@ def settle_labels(figure: "Figure") -> None:
     # labels must not move what they were measured against
     figure.set_layout_engine(None)
     levels = np.asarray(canvas.buffer_rgba())[::-1, :, :3].min(axis=2)
-    # plates and grids are fainter, and may be covered
-    inked = levels < 200
+    inked = levels < _INKED
     for label in sorted(labels, key=lambda label: -len(label.get_text())):
         label.set_visible(True)
         _place(label, inked, canvas.get_renderer())
@@ -84,11 +97,10 @@ def _place(label: Any, inked: Mask, renderer: Any) -> None:
     point = complex(*label.axes.transData.transform(label.xy))
     outward = cmath.phase(complex(*label.xyann))
     extent = label.get_window_extent(renderer)
-    margin = 2.5 * per_point  # half the width of a bar and a little more
+    margin = _MARGIN * per_point
     half = complex(0.5 * extent.width + margin, 0.5 * extent.height + margin)
     least = math.inf
-    # distances from the point to the label's edge, typographic points
-    for reach, k in product((7.0, 11.0, 16.0, 21.0), range(LABEL_DIRECTIONS)):
+    for reach, k in product(_REACH, range(LABEL_DIRECTIONS)):
         # outwards first, then by turns to either side
         side = 1 if k % 2 else -1
         turned = (k + 1) // 2 * side * math.tau / LABEL_DIRECTIONS
@@ -100,8 +112,7 @@ def _place(label: Any, inked: Mask, renderer: Any) -> None:
         box = inked[_span(low.imag, high.imag), _span(low.real, high.real)]
         is_whole = window.contains(*split_complex(low))
         is_whole &= window.contains(*split_complex(high))
-        # 300 square points of what is drawn are covered rather than the axes left
-        cost = box.sum() / per_point**2 + 300.0 * (not is_whole)
+        cost = box.sum() / per_point**2 + _CUT * (not is_whole)
         cost += 0.1 * (reach + k)
         if cost < least:
             least = cost

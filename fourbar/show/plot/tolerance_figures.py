@@ -35,6 +35,13 @@ if TYPE_CHECKING:
 _MOST_SHARES = 5
 """Tolerances that have a colour of their own; the others are drawn together."""
 _SHADES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", FAINT)
+_MOST_BANDS = 7
+"""Torque, four pin forces, and the components of one point; the eighth is for shares.
+"""
+_OFF_SCALE = 98.0
+"""Percentile of the half widths beyond which an axis is not stretched. Towards a limit
+they grow without end.
+"""
 
 
 def draw_tolerances(
@@ -56,8 +63,7 @@ def draw_tolerances(
             "one position",
             "a picture of bands needs a sweep",
         )
-    # torque, four pin forces, and the components of one point; the eighth is for shares
-    parts = list_drawn_parts(spreads)[:7]
+    parts = list_drawn_parts(spreads)[:_MOST_BANDS]
     columns = (len(parts) + 2) // 2
     axis = axis_of(spreads.scene, command(spreads.scene), units)
 
@@ -94,9 +100,7 @@ def _draw_band(
     lines = np.concatenate([ends - spread.nominal, [spread.worst, -spread.worst]])
     sizes = np.abs(lines[:5])
     sizes = sizes[np.isfinite(sizes)]
-    # percentile of the half widths beyond which an axis is not stretched. Towards a
-    # limit they grow without end.
-    most = 1.1 * float(np.percentile(sizes, 98.0)) if sizes.size else 0.0
+    most = 1.1 * float(np.percentile(sizes, _OFF_SCALE)) if sizes.size else 0.0
     factor, unit = choose_scale(most, find_part_unit(part), units)
     low, high, least, greatest, *worst = factor * lines
     colour = FORCE_COLOURS.get(part.strip("|"), INK)

@@ -38,6 +38,14 @@ STEPS_OF_A_PATH = 36_000
 """Steps along a circuit, a multiple of 4: near a small transmission angle a degree may
 be a long chord.
 """
+_LEAD = math.radians(60.0)
+"""Angle of the drawn position from the first that is well conditioned, rad. In a
+shorter sweep it is half of the sweep.
+"""
+BARREL = 0.85
+"""Length of a cylinder's barrel over the shortest stroke of the sweep. The rod is what
+comes out of it.
+"""
 
 
 class DrawingPlane:
@@ -60,7 +68,7 @@ class DrawingPlane:
         self.barrel = 0.0
         """Length of what of a cylinder keeps its length; 0 without a cylinder."""
         if sweep.stroke is not None:
-            self.barrel = 0.85 * self.factor * float(np.nanmin(sweep.stroke))
+            self.barrel = BARREL * self.factor * float(np.nanmin(sweep.stroke))
         state = compute_shown_state(scene, sweep.at)
         for load in scene.settled().loads:
             foot = load.foot(bars.bar(load.bar).to_centre)
@@ -381,5 +389,5 @@ def _choose_position(sweep: Solution) -> float:
     good = sweep.at.places[quality >= min(CLEAR, float(quality.max()))]
     lead = 0.5 * float(np.ptp(good))
     if not sweep.at.moves_stroke:
-        lead = min(math.radians(60.0), lead)
+        lead = min(_LEAD, lead)
     return float(good[np.argmin(np.abs(good - good[0] - lead))])
