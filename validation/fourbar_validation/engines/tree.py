@@ -150,7 +150,7 @@ class Loaded(Assembled, Protocol):
         """
 
     def point(self, name: str) -> Array:
-        """Locate a point that `description.parts` names, world axes, (2,), m.
+        """Locate a point that `list_moving_parts` names, world axes, (2,), m.
 
         The array may be the engine's own memory.
         """
@@ -185,7 +185,7 @@ class Loaded(Assembled, Protocol):
         return vector * complex(*self.rotation(bar)[:, 0].tolist())
 
     def locate(self, name: str) -> complex:
-        """Locate a point that `description.parts` names, m."""
+        """Locate a point that `list_moving_parts` names, m."""
         return complex(*self.point(name).tolist())
 
     def first_pin(self, bar: int) -> complex:
@@ -332,7 +332,7 @@ class Tree(Loaded, Protocol):
     v: Array
     a: Array
     at: Mapping[str, Array]
-    """Places of the points that `description.parts` names, m: the engine's memory."""
+    """Places of the points that `list_moving_parts` names, m: the engine's memory."""
     turned_to: Mapping[int, Array]
     """Axes along and across each bar's line: the engine's memory."""
 

@@ -1,6 +1,6 @@
-"""`fourbar-validation loops`: the closed loops of a robot's file.
+"""`fourbar-validation loops`: print the closed loops of a robot's file.
 
-A scene is made from one of them.
+`engines/mujoco/robots/closures.py` finds them, `loop_scene.py` makes a scene of one.
 """
 
 from pathlib import Path
