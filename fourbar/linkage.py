@@ -148,7 +148,7 @@ def require_numbers(
     allowed: str = "must be finite numbers",
     unit: str = "1",
 ) -> Array:
-    """Return the value as finite floats, shape () or (n,).
+    """Return the value as finite floats in `unit`, shape () or (n,).
 
     Raises an InputError that says what is allowed. A text with a unit is converted as
     by `require`, in a list too.

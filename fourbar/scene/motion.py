@@ -532,7 +532,10 @@ class Motion(Described):
 
     @property
     def angle(self) -> Any:
-        """Commanded angle, rad, or stroke, m, as it is stated."""
+        """Commanded angle, rad, or stroke, m: one, an array (n,), a Sweep, a FromLimit.
+
+        None: the default range, or what a law states.
+        """
         return getattr(self, self.names[0])
 
     @property

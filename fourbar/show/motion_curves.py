@@ -296,6 +296,8 @@ def _fit_curves(solution: Solution) -> MotionCurves:
     def fit(
         list_curves: Callable[[Solution], Curves], stage: str, most_halvings: int
     ) -> Panels:
+        """Fit panels to the curves that solutions up to a stage have."""
+
         def compute(places: Array) -> Curves:
             return list_curves(solve(scene, stage, at=command_at(scene, places)))
 

@@ -138,6 +138,7 @@ class Facts:
         return [] if self.solution.stroke is None else self._find_ranges("stroke")
 
     def _find_ranges(self, name: str) -> list[tuple[Peak, Peak]]:
+        """Find the least and the greatest value of a curve in each circuit passed."""
         return [
             (panels.find_peak(name, LOWER), panels.find_peak(name, UPPER))
             for panels in self.motion.of_circuits

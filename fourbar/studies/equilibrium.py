@@ -195,7 +195,7 @@ def equilibrium(scene: Scene) -> Equilibria:
 
 
 def _mark_wound(curve: CircuitCurve, tau: Array) -> Mask:
-    """Mark places at which a torsion spring is wound beyond half a turn from its rest.
+    """Mark places, (n,), where a torsion spring is wound beyond half a turn from rest.
 
     Not marked is what lies beyond a limit or a change point from the first position.
     """

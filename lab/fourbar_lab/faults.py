@@ -104,7 +104,7 @@ def try_in_turn(numbers: Sequence[int]) -> list[_Failing | str]:
 def _try_every_fault(workers: int) -> Iterator[tuple[str, str | None]]:
     """Try every fault, first the tree without one.
 
-    Return the reason why it survives, or None.
+    Yield its name, and the reason why it survives or None.
     """
     entries = read_faults()
     rows = try_faults(())

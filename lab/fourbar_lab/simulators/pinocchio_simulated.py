@@ -155,7 +155,7 @@ class PinocchioSolvers(Simulator):
     single_states = True
 
     def through(self, scene: Scene, course: Course) -> Readings:
-        """Run through a course, carried by a flywheel."""
+        """Return the readings of a run through a course, carried by a flywheel."""
         solver = self.settings[self.setting]
         begin = start(scene)
         tree = PinocchioTree(scene)

@@ -116,7 +116,7 @@ def _add_viscous_couple(
     motion: BodyMotion,
     wrenches: BodyWrenches,
 ) -> None:
-    """Couple -k (omega_j - omega_i)."""
+    """Add couples -k (omega_j - omega_i), N m, at the pins."""
     for pin, k in effect.coefficients:
         wrenches.twist_at(pin, -k * motion.slip(pin))
 
@@ -126,7 +126,10 @@ def _add_friction_couple(
     motion: BodyMotion,
     wrenches: BodyWrenches,
 ) -> None:
-    """Couple -f sign(omega_j - omega_i), none at rest."""
+    """Add couples -f sign(omega_j - omega_i), N m, at the pins.
+
+    At rest the sign is that of the motion about to begin; without one there is none.
+    """
     for pin, f in effect.torques:
         wrenches.twist_at(pin, -f * motion.sense(pin))
 

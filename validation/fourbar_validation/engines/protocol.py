@@ -215,7 +215,10 @@ def _refuse_unknown(data: Message, allowed: tuple[str, ...]) -> None:
 def _read_motion(
     names: tuple[str, str, str], data: Message, n: int | None = None
 ) -> tuple[Array, float | Array | None, float | Array | None]:
-    """Read places, speed and acceleration; None where a rate is not stated."""
+    """Read angles, rad, or strokes, m, (n,), with their speed and acceleration.
+
+    A rate is one number or (n,), per s or s^2; None: it is not stated.
+    """
     places = _read_numbers(f"command.{names[0]}", data[names[0]], n)
     n = len(places)
     speed, acceleration = (

@@ -202,7 +202,7 @@ class ClosedLoop(Assembled):
         mujoco.mj_rnePostConstraint(self.model, self.data)
 
     def forces(self) -> dict[str, Array]:
-        """Read the pin forces of the state that was last forwarded, world axes, N."""
+        """Read the pin forces of the state last forwarded, world axes, (2,) each, N."""
         on = self.joint_forces()
         closure = self.data.efc_force[:2].copy()
         return {"F12": on[2], "F32": -on[3], "F43": closure, "F14": on[4]}

@@ -204,9 +204,9 @@ class _RestPose:
         return 3, 4
 
     def _find_line(self, joint: int, other: int) -> tuple[Array, float]:
-        """Return the way between two hinges across the leader's axis, (3,), m.
+        """Return the way between two hinges and its length, (3,) and a number, m.
 
-        Its length comes with it.
+        The part along the leader's axis is left out.
         """
         normal = self.data.xaxis[self.tie.leader]
         line = self.data.xanchor[joint] - self.data.xanchor[other]
