@@ -122,7 +122,7 @@ def test_the_right_table_of_the_free_bodies_differs_in_nothing(read):
     "names, turned, said",
     [
         (FORCES, -0.02, "2 ms late (forces of an earlier instant)"),
-        (("omega_4", *FORCES), -0.02, "2 ms late (numbers of an earlier instant)"),
+        (("omega_4", *FORCES), -0.02, "2 ms late"),
         (FORCES, 0.005, "0.5 ms early (forces of a later instant) (fitted)"),
         (FORCES, math.radians(90.0), "theta_2 +90 deg is what they solved"),
     ],

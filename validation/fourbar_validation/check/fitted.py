@@ -134,20 +134,17 @@ def _list_multiples(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
 
 
 def _list_offsets(column: JudgedColumn) -> Iterator[tuple[str, Array]]:
-    """List the constant by which a column may differ from ours, as of a sensor."""
-    if np.count_nonzero(column.where) < ENOUGH_NUMBERS:
+    """List the constant by which numbers may differ from ours, as of a sensor."""
+    if column.ours.ndim > 1 or np.count_nonzero(column.where) < ENOUGH_NUMBERS:
         return
-    right: Any = compute_column(column.judge.right, column.quantity)
     apart = column.theirs - column.ours
     if column.quantity.startswith("theta"):
         apart = wrap_difference(apart)
     allowed = (column.judged_right[1] * column.divisor)[column.where]
-    offset = np.average(apart[column.where], axis=0, weights=allowed**-2.0)
-    unit = column.unit
-    stated = np.atleast_1d(offset / unit.factor)
-    numbers = ", ".join(f"{x:+.5g}" for x in stated[np.isfinite(stated)])
-    text = f"every number is ours {numbers} {unit.text} {FITTED}"
-    yield text, right + np.nan_to_num(offset)
+    offset = np.average(apart[column.where], weights=allowed**-2.0)
+    number = offset / column.unit.factor
+    text = f"every number is ours {number:+.5g} {column.unit.text} {FITTED}"
+    yield text, column.ours + offset
 
 
 def _multiply(ratio: complex, values: Array, mirrored: bool) -> Array:
@@ -423,13 +420,11 @@ def _delay(
     """Return the problem of forces, or of all numbers, that are so many ms late."""
     assert judge.rows.later is not None
     at = drop_remainder(judge.rows.later(-late / 1e3))
-    mistake = solve_other("", scene, at)
-    of = "numbers"
+    word, instant = ("late", "an earlier") if late > 0.0 else ("early", "a later")
+    mistake = solve_other(f"{abs(late):.6g} ms {word}", scene, at)
     if all(column.quantity in FORCE_NAMES for column in columns):
-        mistake, of = mistake.within(FORCE_NAMES), "forces"
-    when = ("late", "an earlier") if late > 0.0 else ("early", "a later")
-    text = f"{abs(late):.6g} ms {when[0]} ({of} of {when[1]} instant)"
-    return mistake._replace(text=text)
+        return mistake.within(FORCE_NAMES, f" (forces of {instant} instant)")
+    return mistake
 
 
 def _hasten(

@@ -168,9 +168,8 @@ def group_numbers(scene: Scene, places: bool) -> dict[str, Numbers]:
     for key, entry in list_entries(scene).items():
         acts = key.startswith(("bars.", "loads.", "effects."))
         value = read_number(scene, entry)
-        if not acts or not value or (entry.unit in _PLACE_UNITS) != places:
-            continue
-        if key == GRAVITY_ANGLE:
+        is_other = (entry.unit in _PLACE_UNITS) != places or key == GRAVITY_ANGLE
+        if not acts or not value or is_other:
             continue
         parts = key.split(".")
         which = 2 if parts[0] == "effects" else 1
