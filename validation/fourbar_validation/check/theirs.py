@@ -435,11 +435,11 @@ def _find_header(rows: list[list[str]]) -> int:
     filled = [sum(map(bool, map(str.strip, cells))) for cells in rows]
     first = next((i for i in range(len(rows)) if 2 * numbers[i] > filled[i]), 0)
     header = max((i for i in range(first) if not numbers[i]), default=0)
-    above = header - 1
-    names = {_spell(re.split(r"[\[(/]", cell)[0]) for cell in rows[header]}
-    if above < 0 or names & {*_OTHER_NAMES} or len(rows[above]) != len(rows[header]):
+    if header == 0 or len(rows[header - 1]) != len(rows[header]):
         return header
-    return above if _is_unit_line(rows[header]) else header
+    names = {_spell(re.split(r"[\[(/]", cell)[0]) for cell in rows[header]}
+    of_units = _is_unit_line(rows[header]) and not names & {*_OTHER_NAMES}
+    return header - of_units
 
 
 def _is_unit_line(cells: list[str]) -> bool:
