@@ -13,7 +13,7 @@ that bar, and by it what is singular at the limits of theta_2 is not.
 
 The branch of a path is an assembly: its root keeps its formula, and with it the motion
 is smooth through change points. The sign of the sine at a position follows from the
-lengths and the angle alone, `LoopPath.sign`.
+lengths and the angle alone: `find_root_sign` of `position.py`, read by `LoopPath.sign`.
 """
 
 from typing import NamedTuple

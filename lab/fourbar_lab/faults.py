@@ -1,4 +1,4 @@
-"""Injected faults against the harness, each in a process of its own.
+"""Try the faults of faults.toml, which `injection.py` plants, in processes apart.
 
 None may survive without a reason.
 """

@@ -1,4 +1,7 @@
-"""`fourbar-validation compare` and `accept`."""
+"""`fourbar-validation compare` and `accept`.
+
+`changes.py` compares the rows of two runs, `rules.py` the rules.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
