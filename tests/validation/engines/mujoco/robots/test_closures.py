@@ -467,7 +467,8 @@ def test_without_a_motor_the_first_hinge_of_the_ground_is_driven():
 )
 def test_what_drives_a_loop_by_no_hinge_is_named(drive):
     rope = (
-        '<tendon><spatial name="rope"><site site="base"/><site site="tip"/></spatial>'
+        '<tendon><spatial name="rope"><site site="base"/><site site="tip"/>'
+        '<site site="base"/></spatial>'
     )
     planar = Planar(
         drive="",
@@ -476,8 +477,11 @@ def test_what_drives_a_loop_by_no_hinge_is_named(drive):
         more=f'{rope}</tendon><actuator><motor name="push" {drive}/></actuator>',
     )
     (chosen,) = loop_of(planar.text()).chosen
-    remark = "what drives it is on no hinge (the actuator push)"
-    assert chosen == f"{remark}: O2 is taken as driven (--drive states another)"
+    assert chosen == (
+        "what drives it is on no hinge (the actuator push), and a couple gives other"
+        " pin forces ([drive] from and to of a SCENE state a cylinder): O2 is taken as"
+        " driven (--drive states another)"
+    )
 
 
 def test_a_loop_is_chosen_by_its_name():

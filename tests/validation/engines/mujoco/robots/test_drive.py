@@ -1,11 +1,13 @@
 """Drives of a scene on the loop of a file: couples, cylinders and pushes."""
 
+import cmath
 import math
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+from pytest import approx
 
 from fourbar.files import load, loads
 from fourbar.formulas.mobility import find_circuit
@@ -91,6 +93,56 @@ def test_every_drive_is_that_of_the_formulas_in_a_file_without_it(drive):
     for error in errors:
         assert error.median < SOFT, error
     assert len(loop.through_time.rows) > 10
+
+
+def write_cylinders(*ends, across=0.0):
+    """Write a planar robot with motors on tendons between two of its sites each."""
+    tendons = "".join(
+        f'<spatial name="rope{i}"><site site="{one}"/><site site="{two}"/></spatial>'
+        for i, (one, two) in enumerate(ends)
+    )
+    motors = "".join(
+        f'<motor name="ram{i}" tendon="rope{i}"/>' for i in range(len(ends))
+    )
+    return Planar(
+        drive="",
+        ground='<site name="base" pos=".05 -.15 0"/><site name="eye" pos="0 0 .1"/>',
+        on_coupler=f'<site name="tip" pos=".01 .02 {across}"/>',
+        more=f"<tendon>{tendons}</tendon><actuator>{motors}</actuator>",
+    ).text()
+
+
+def test_a_cylinder_of_the_file_drives_its_scene():
+    """A second one joins sites of one bar, and moves nothing."""
+    text = write_cylinders(("base", "tip"), ("eye", "base"))
+    made = read_scene(text)
+    pins = Planar().pins
+    ground, coupler = (
+        complex(*np.subtract(pins[end], pins[start]))
+        for start, end in (("O2", "O4"), ("A", "B"))
+    )
+    for place, bar, point, line in (
+        (made.scene.drive.start, 1, 0.05 - 0.15j, ground),
+        (made.scene.drive.end, 3, 0.01 + 0.02j, coupler),
+    ):
+        assert place.bar == bar
+        there = cmath.rect(*place.from_pin) * line / abs(line)
+        assert there == approx(point, abs=1e-10)
+    assert "the actuator ram0 drives it as a cylinder (--drive O2 states a couple)" in (
+        made.remarks
+    )
+    loop = measure(text)
+    assert find_left_out(loop) < 1e-8
+    assert "drive_force" in {error.quantity for error in list_errors_by_method(loop)}
+    assert read_scene(text, drive="O2").scene.drive is None
+    both = write_cylinders(("base", "tip"), ("eye", "tip"))
+    assert read_scene(both).scene.drive is None
+
+
+def test_how_far_a_cylinder_leans_out_of_the_plane_is_said():
+    made = read_scene(write_cylinders(("base", "tip"), across=0.03))
+    said = "not in the scene: 0.03 m across the plane between its cylinder's ends"
+    assert said in made.remarks
 
 
 STIFF = 'solref="0.005 1" solimp="0.9999 0.9999 0.001 0.5 2"'

@@ -38,6 +38,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     name_part,
     take_control,
 )
+from fourbar_validation.engines.mujoco.robots.drive import find_cylinder
 from fourbar_validation.engines.mujoco.robots.loop_facts import (
     PoseOptions,
     RobotClosure,
@@ -596,8 +597,8 @@ class _Finder:
             )
         return ""
 
-    def _describe_pulling(self, chain: _Chain) -> str:
-        """Describe the motors that move joints of a chain."""
+    def _list_pulling(self, chain: _Chain) -> list[int]:
+        """List the motors that move joints of a chain."""
         model = self.model
         data = self.data
         mujoco.mj_tendon(model, data)
@@ -606,8 +607,8 @@ class _Finder:
         places = (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
         mujoco.mju_sparse2dense(pulls, data.actuator_moment, *places)
         dofs = model.jnt_dofadr[chain.joints]
-        pulling = np.flatnonzero(pulls[:, dofs].any(axis=1) & take_control(model))
-        return ", ".join(describe_actuator(model, one) for one in pulling.tolist())
+        pulling = pulls[:, dofs].any(axis=1) & take_control(model)
+        return [*map(int, np.flatnonzero(pulling))]
 
     def _make_loop(self, chain: _Chain, *, from_other_end: bool = False) -> RobotLoop:
         """Lay a closed chain of four pins out as ground, input, coupler and output.
@@ -688,13 +689,24 @@ class _Finder:
             )
         closures, others = self._sort_equalities(loop)
         remarks = self._describe_offset(closures, loop, normal)
-        return replace(
+        loop = replace(
             loop,
             closures=closures,
             other_equalities=others,
             chosen=tuple(chosen),
             remarks=tuple(remarks),
         )
+        cylinder = find_cylinder(self.model, loop)
+        if chosen and cylinder and cylinder == self._list_pulling(chain):
+            return self._drive_by(loop, *cylinder)
+        return loop
+
+    def _drive_by(self, loop: RobotLoop, cylinder: int) -> RobotLoop:
+        """Return a loop that a cylinder drives in place of a couple."""
+        by = describe_actuator(self.model, cylinder)
+        hinge = name_joint(self.model, loop.joint)
+        text = f"{by} drives it as a cylinder (--drive {hinge} states a couple)"
+        return replace(loop, chosen=(text,), cylinder=cylinder)
 
     def _choose_axes(self, loop: RobotLoop, normal: Array) -> Array:
         """Return x, y and the normal of a loop's plane in the frame of its ground.
@@ -736,8 +748,12 @@ class _Finder:
             reason = "no motor acts on it"
             if driven:
                 reason = f"the motor on {names} acts between two moving bars"
-            elif pulling := self._describe_pulling(chain):
-                reason = f"what drives it is on no hinge ({pulling})"
+            elif pulling := self._list_pulling(chain):
+                names = ", ".join(describe_actuator(model, one) for one in pulling)
+                reason = (
+                    f"what drives it is on no hinge ({names}), and a couple gives other"
+                    " pin forces ([drive] from and to of a SCENE state a cylinder)"
+                )
         elif len({*driven}) == 1:
             return chosen, []
         taken = f"{name_joint(model, chosen)} is taken as driven"

@@ -17,6 +17,19 @@ from fourbar_validation.engines.mujoco.robots.seen import LoopFrame
 _SITE = mujoco.mjtWrap.mjWRAP_SITE
 
 
+def find_cylinder(model: mujoco.MjModel, loop: RobotLoop) -> list[int]:
+    """Return the motor between two sites of two bars, if a loop has exactly one."""
+    cylinders = []
+    on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+    for number in np.flatnonzero(on_tendons & take_control(model)).tolist():
+        wraps = [*list_wraps(model, model.actuator_trnid[number, 0])]
+        sites = [site for kind, site, _ in wraps if kind == _SITE]
+        bars = {loop.bars[body] for body in model.site_bodyid[sites]} - {None}
+        if len(wraps) == len(bars) == 2:
+            cylinders.append(number)
+    return cylinders if len(cylinders) == 1 else []
+
+
 class LoopDrive:
     """What a scene's drive exerts on the bars of a loop, per N m or N.
 
@@ -36,14 +49,12 @@ class LoopDrive:
         self.cylinders: list[int] = []
         """Actuator of the file between two sites that drives, if it has exactly one."""
         if isinstance(self.force, LinearDrive):
-            on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
-            motors = np.flatnonzero(on_tendons & take_control(model))
-            self.cylinders = motors.tolist()
-        tendons = model.actuator_trnid[self.cylinders, 0].tolist()
-        wraps = [wrap for tendon in tendons for wrap in list_wraps(model, tendon)]
-        self.sites = [site for kind, site, _ in wraps if kind == _SITE]
-        if len(tendons) != 1 or not len(self.sites) == len(wraps) == 2:
-            self.cylinders = []
+            self.cylinders = find_cylinder(model, loop)
+        self.sites = [
+            site
+            for number in self.cylinders
+            for _, site, _ in list_wraps(model, model.actuator_trnid[number, 0])
+        ]
 
     def _find_loads(self, data: mujoco.MjData) -> Array:
         """Return force and couple on each body, world axes, (nbody, 6), per N m or N.

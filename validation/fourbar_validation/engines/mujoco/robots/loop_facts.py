@@ -152,6 +152,8 @@ class RobotLoop:
     """Active equalities that act on its moving bars and are no closure of it."""
     chosen: tuple[str, ...] = ()
     """Why its driven hinge is taken, where neither a motor nor an option tells."""
+    cylinder: int | None = None
+    """Motor between sites of two of its bars that drives it, if no hinge does."""
     remarks: tuple[str, ...] = ()
     met: tuple[float, ...] = ()
     """Lengths as they are read, m. Beyond round-off they differ from its own where the

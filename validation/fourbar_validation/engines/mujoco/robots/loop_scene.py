@@ -14,7 +14,17 @@ from decimal import Decimal
 import mujoco
 import numpy as np
 
-from fourbar.effects import Effect, Flywheel, Friction, Gravity, Load, Torsion, Viscous
+from fourbar.effects import (
+    Effect,
+    Flywheel,
+    Friction,
+    Gravity,
+    LinearDrive,
+    Load,
+    Torsion,
+    Viscous,
+)
+from fourbar.effects.place import Place
 from fourbar.errors import InputError
 from fourbar.formulas.mobility import (
     DIGITS_STATED,
@@ -38,6 +48,7 @@ from fourbar_validation.engines.mujoco.robots.ancestry import (
     is_enabled,
     list_actuators,
     list_lifted_masses,
+    list_wraps,
     name_body,
     name_joint,
     take_control,
@@ -295,7 +306,13 @@ class SceneOfLoop(SeenLoop):
         self._remark_what_is_left_out(lumps)
         loads = tuple(self._list_loads())
         return Scene(
-            linkage, motion, loads=loads, effects=effects, title=title, source=source
+            linkage,
+            motion,
+            drive=self._find_cylinder(),
+            loads=loads,
+            effects=effects,
+            title=title,
+            source=source,
         )
 
     def meet_lengths(self, wanted: Lengths | None = None) -> RobotLoop:
@@ -434,11 +451,31 @@ class SceneOfLoop(SeenLoop):
             force = -float(lifted.sum()) * self._pull
             if not force:
                 continue
-            place = self.polar(bar, lifted @ data.xipos[bodies] / lifted.sum())
+            place = self._place(bar, lifted @ data.xipos[bodies] / lifted.sum())
             size = round_off(abs(force))
             angle = _round_angle(cmath.phase(force))
-            from_pin = (round_off(place[0]), _round_angle(place[1]))
-            yield Load(bar, (size, angle), from_pin=from_pin)
+            yield Load(bar, (size, angle), from_pin=place.from_pin)
+
+    def _place(self, bar: int, point: Array) -> Place:
+        """Return a place of a bar, by its point in world axes, (3,), m."""
+        distance, angle = self.polar(bar, point)
+        return Place(bar, (round_off(distance), _round_angle(angle)))
+
+    def _find_cylinder(self) -> LinearDrive | None:
+        """Return what drives the loop, None for a couple."""
+        model = self.model
+        if self.loop.cylinder is None:
+            return None
+        tendon = model.actuator_trnid[self.loop.cylinder, 0]
+        sites = [site for _, site, _ in list_wraps(model, tendon)]
+        start, end = self.data.site_xpos[sites]
+        across = abs(float((end - start) @ self.normal))
+        if across > _ACROSS * math.dist(start, end):
+            self._leave_out(
+                f"{across:.4g} m across the plane between its cylinder's ends"
+            )
+        first, second = (self.loop.bars[body] for body in model.site_bodyid[sites])
+        return LinearDrive(self._place(first, start), self._place(second, end))
 
     def _find_sweep(self) -> tuple[float, float, list[float]]:
         """Follow the loop over the range of the driven hinge.
