@@ -467,25 +467,28 @@ class Bar(Described):
         Described.__post_init__(self)
         size = "diameter" if self.section is None else "section"
         modulus = self.section_modulus
-        allowed = {}
+        wrong = allowed = ""
         if self.section is not None and self.diameter is not None:
-            allowed["diameter"] = "must be left out beside a section"
+            wrong = "diameter"
+            allowed = "must be left out beside a section"
         elif modulus is not None and not 0.0 < modulus < math.inf:
-            allowed[size] = (
-                "is no size of a bar: the cube of it must be a positive double"
-            )
+            wrong = size
+            allowed = "is no size of a bar: the cube of it must be a positive double"
         elif self.density is not None and self.area is None:
-            allowed["density"] = "needs the cross-section: section or diameter"
+            wrong = "density"
+            allowed = "needs the cross-section: section or diameter"
         elif self.density is not None and self.mass_per_length is not None:
-            allowed["density"] = "must be left out beside mass_per_length"
+            wrong = "density"
+            allowed = "must be left out beside mass_per_length"
         elif self.mass not in (0.0, self.weigh()):
-            allowed["mass"] = (
+            wrong = "mass"
+            allowed = (
                 "must be left out (0 in dataclasses.replace): density or"
                 " mass_per_length states it, unless it is None"
             )
-        for name, reason in allowed.items():
-            unit = Bar.numbers[name].unit
-            raise InputError(name, getattr(self, name), reason, unit=unit)
+        if wrong:
+            unit = Bar.numbers[wrong].unit
+            raise InputError(wrong, getattr(self, wrong), allowed, unit=unit)
         object.__setattr__(self, "mass", self.weigh())
 
     @property

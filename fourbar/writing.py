@@ -207,8 +207,10 @@ def write_between(values: Any) -> str:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return "no value"
-    ends = dict.fromkeys((finite.min(), finite.max()))
-    return " to ".join(f"{end:.6g}" for end in ends)
+    least, greatest = finite.min(), finite.max()
+    if least == greatest:
+        return f"{least:.6g}"
+    return f"{least:.6g} to {greatest:.6g}"
 
 
 def list_names(what: str, names: Iterable[str]) -> str:

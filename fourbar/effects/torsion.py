@@ -11,7 +11,7 @@ from fourbar.formulas.arithmetic import Number, angle, wrap_angle
 from fourbar.formulas.motion import State
 from fourbar.formulas.position import ROLES_OF_BARS, reorder_lengths
 from fourbar.linkage import PINS, POSITIVE, Declared, FourBar, copy_with, record
-from fourbar.quantities import WOUND, Array, Codes, Signs
+from fourbar.quantities import OK, WOUND, Array, Codes, Signs
 
 HALF_TURN = math.pi * (1.0 - 1e-12)
 """rad; at half a turn itself rounding would decide in which sense the spring turns."""
@@ -78,7 +78,9 @@ class Torsion(PinRows):
     ) -> Codes | None:
         """Return WOUND at half a turn from rest and beyond."""
         wound = [*self.list_wound(state, branch).values()]
-        return WOUND * np.any(wound, axis=0).astype(np.uint8) if wound else None
+        if not wound:
+            return None
+        return np.where(np.any(wound, axis=0), WOUND, OK).astype(np.uint8)
 
     def list_wound(self, state: State, branch: Number) -> dict[str, Number]:
         """List where each sprung pin is at half a turn from rest and beyond."""

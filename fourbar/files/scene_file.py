@@ -408,14 +408,13 @@ def _read_tolerances(table: Entry, scene: Scene) -> tuple[Tolerance, ...]:
             raise tolerance.refuse(allowed)
         unit = entries[key].unit
         sigma = isinstance(stated, list)
-        if sigma:
-            if len(stated) != 2 or stated[1] != SIGMA:
-                form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
-                raise tolerance.refuse(f"must be like {form}")
-            tolerance.value = stated[0]
-        read = Tolerance(key, tolerance.check(Declared(unit, POSITIVE)), sigma)
+        if sigma and (len(stated) != 2 or stated[1] != SIGMA):
+            form = f'"0.05 {unit}" or ["0.02 {unit}", "{SIGMA}"]'
+            raise tolerance.refuse(f"must be like {form}")
+        width = tolerance.holding(stated[0] if sigma else stated)
+        read = Tolerance(key, width.check(Declared(unit, POSITIVE)), sigma)
         if (misfit := find_misfit(scene, entries[key], read)) is not None:
-            raise tolerance.refuse(misfit)
+            raise width.refuse(misfit)
         tolerances.append(read)
     if (overlap := find_overlap(flat.keys())) is not None:
         length, pin = overlap

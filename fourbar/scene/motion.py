@@ -260,8 +260,8 @@ class Law(Described, _OverTime):
         if self.omega is None:
             curve = CubicSpline(t, angle, bc_type=SPLINES[self.ends])
         else:
-            stated = filter(None, (self.angle, self.omega, self.alpha))
-            curve = _fit_rates(self.time, *stated)
+            rates = [self.omega] if self.alpha is None else [self.omega, self.alpha]
+            curve = _fit_rates(self.time, self.angle, *rates)
         theta, omega, alpha = (np.asarray(curve(time, order)) for order in range(3))
         if self.omega is not None or self.ends == "rest":
             # a polynomial rounds where it ends, which must not move what rests there

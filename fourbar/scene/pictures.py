@@ -120,7 +120,7 @@ class TracedPicture(_PictureFile, Described):
 
     def read(self) -> tuple[bytes, str]:
         """Return the content of the file and its type, as a browser names it."""
-        return read_picture(self.key, self.find_file(), self.name, "PNG, JPEG or SVG")
+        return read_picture(self.key, self.find_file(), self.name, svg=True)
 
 
 @record
@@ -160,9 +160,11 @@ class Picture(_PictureFile):
 
 
 def read_picture(
-    key: str, path: str | Path, shown: str, allowed: str = "PNG or JPEG"
+    key: str, path: str | Path, shown: str, *, svg: bool = False
 ) -> tuple[bytes, str]:
     """Return the content of a picture and its type, as a browser names it.
+
+    `svg`: take an SVG file too.
 
     Raises InputError, in one line, as `read_bytes` does, and for another type.
     """
@@ -170,9 +172,10 @@ def read_picture(
     for magic, kind in _RASTER.items():
         if content.startswith(magic):
             return content, kind
-    if "SVG" in allowed and b"<svg" in content[:LONGEST_SVG_HEAD]:
+    if svg and b"<svg" in content[:LONGEST_SVG_HEAD]:
         return content, "image/svg+xml"
-    raise InputError(key, shown, f"must be a {allowed} picture")
+    formats = "PNG, JPEG or SVG" if svg else "PNG or JPEG"
+    raise InputError(key, shown, f"must be a {formats} picture")
 
 
 def encode_picture(key: str, path: str | Path, shown: str | None = None) -> str:

@@ -138,7 +138,7 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
         is_whole = {*command(scene).places[[0, -1]]} == {*solution.at.places[[0, -1]]}
     notes = []
     for number, spring in enumerate(springs, 1):
-        for sense, end, room, is_there in _list_ends(spring):
+        for sense, end, room, words in _list_ends(spring):
             is_beyond = partial(_mark_beyond, spring, sense, end + sense * room)
             motion = solution
             if is_whole:
@@ -146,18 +146,18 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
             beyond = is_beyond(motion)
             # a spring that pulls throughout may be one that does
             throughout = beyond[motion.assembled].all()
-            if not beyond.any() or (throughout and not is_there):
+            if not beyond.any() or (throughout and not words):
                 continue
             where = " and ".join(
                 write_stretch(motion, stretch, units)
                 for stretch in list_stretches(beyond, motion.at.places)
             )
             said = (
-                f", a gas spring, is {is_there} length of"
+                f", a gas spring, is {words} length of"
                 f" {write_short(end, 'm', units)} {where}: it is taken to push on, and"
                 " has no stops"
             )
-            if not is_there:
+            if not words:
                 said = (
                     f' pulls {where} and pushes elsewhere: with acts = "push" or "pull"'
                     " it acts one way"
@@ -221,8 +221,8 @@ def _list_wound(
 def _list_ends(spring: Spring) -> list[tuple[float, float, float, str]]:
     """List the lengths beyond which a remark on a spring is due.
 
-    An entry has the sense of beyond, the length and the room at it, m, and what a gas
-    spring is there; its room is never 0, that of any other spring is.
+    An entry has the sense of beyond, the length, the room at it, m, and the words that
+    say what a gas spring is beyond it; the words are empty for any other spring.
     """
     if spring.stroke is None:
         if spring.acts is None and spring.stiffness > 0.0 and spring.slack < 0.0:

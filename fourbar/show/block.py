@@ -709,14 +709,16 @@ class SceneBlock(Facts):
         return self._cells(sizes, unit), places
 
     def _cells(self, values: Iterable[float | None], unit: str) -> list[str]:
-        """Write quantities of one kind; a dash for none."""
+        """Write quantities of one kind: a dash for NaN, "unbounded" for infinity."""
         numbers = _drop_small(values)
         largest = _find_largest(numbers)
-        words = {"nan": "-", "inf": "unbounded"}
-        return [
-            words.get(str(number)) or self._value(number, unit, largest)
-            for number in numbers.tolist()
-        ]
+        cells = []
+        for number in numbers.tolist():
+            if math.isfinite(number):
+                cells.append(self._value(number, unit, largest))
+            else:
+                cells.append("-" if math.isnan(number) else "unbounded")
+        return cells
 
     def _write_remarks(self) -> Iterator[str]:
         """Write where pin forces jump, and what rounding does."""

@@ -259,8 +259,13 @@ class MotionCurves:
 
 
 def find_largest(name: str, ways: Iterable[MotionCurves]) -> float:
-    """Find the largest size of a curve in any of several ways of a motion."""
-    return max(abs(way.find_peak(name).value) for way in ways)
+    """Find the largest size of a curve in any of several ways of a motion.
+
+    The size is infinite if the curve grows without bound in one of them, and NaN if it
+    has no value in one.
+    """
+    # np.max keeps a NaN, wherever it stands
+    return float(np.max([abs(way.find_peak(name).value) for way in ways]))
 
 
 def describe_motion(solution: Solution) -> MotionCurves:

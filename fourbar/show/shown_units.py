@@ -102,14 +102,10 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     try:
         length = str(find_length(document))
         motion = document.get("motion", {})
-        stated = [
-            motion.get(f"{rate}_{bar}", "")
+        rates = [
+            _first_text(motion.get(f"{rate}_{bar}", ""))
             for bar in MOVING_BARS
             for rate in ("omega", "alpha")
-        ]
-        # of a list the first
-        rates = [
-            str([*rate, ""][0] if isinstance(rate, list) else rate) for rate in stated
         ]
         if "free" in motion:
             # what it reaches is read beside its acceleration, unless it states more
@@ -117,6 +113,11 @@ def units_of_scene(document: Mapping[str, Any]) -> Conversion:
     except (LookupError, TypeError, AttributeError):
         return COMMON
     return units_of_length(length, *rates)
+
+
+def _first_text(stated: Any) -> str:
+    """Return a text, or the first of a list."""
+    return str(stated[0]) if isinstance(stated, list) and stated else str(stated)
 
 
 def states_radians(document: Mapping[str, Any]) -> bool:

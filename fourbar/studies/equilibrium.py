@@ -313,10 +313,12 @@ class _Grid:
     def __init__(self, curve: CircuitCurve, places: Array) -> None:
         """Pair neighbouring places along the row, but not across a gap of the sweep."""
         self.curve = curve
-        self.places = places = np.sort(places)
+        places = np.sort(places)
+        self.places = places
         self.gap = np.remainder(np.roll(places, -1) - places, curve.period)
         """Distance to the next place along the row, rad."""
-        self.near = near = self.gap < 2.5 * curve.period / curve.positions
+        near = self.gap < 2.5 * curve.period / curve.positions
+        self.near = near
         """True where no gap of the sweep lies between."""
         points = curve.points(places)
         size = curve.size(points)

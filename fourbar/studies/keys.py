@@ -305,8 +305,9 @@ def _find_drawn(
 ) -> tuple[Place, Any, list[Any], list[Any]]:
     """Return a place of a bar, and where it is in the drawing.
 
-    Returned are the place of a point, a load, an end of a line or a mass centre; the
-    bar's direction, rad; its first pin, m, and the vector from there to the place, m.
+    The place is that of a point, a load, an end of a line or a mass centre. After it
+    follow the bar's direction, rad, its first pin, m, and the vector from there to the
+    place, m.
     Slopes of the pins are left out: a place moves against its bar as that was drawn.
     """
     stated = read_place(scene, path)

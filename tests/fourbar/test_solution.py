@@ -67,6 +67,9 @@ def test_solutions_are_equal_bit_by_bit():
     again.points["P"][0, 0] += 1e-15
     assert solution != again
     assert solve(scene, "velocity") != solve(scene)
+    alike = replace(again, torque=np.zeros_like(again.torque))
+    assert replace(alike, torque=-alike.torque) == alike
+    assert replace(alike, torque=0.0) != alike
 
 
 def test_a_data_frame_names_the_unit_of_each_column():

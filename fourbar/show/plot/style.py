@@ -254,6 +254,9 @@ def find_peak_index(values: Array) -> int:
     return int(np.argmax(np.where(np.isfinite(values), np.abs(values), -1.0)))
 
 
+_RAISED_CHARACTERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, str]:
     """Choose the factor from SI and the unit of an axis.
 
@@ -263,10 +266,8 @@ def choose_scale(largest: float, unit: str, units: Conversion) -> tuple[float, s
     power = math.floor(math.log10(factor * largest)) if largest > 0.0 else 0
     if -4 < power < 5:
         return factor, name
-    named = (
-        f"10{str(power).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))} {name}"
-    )
-    return factor / 10.0**power, named.removesuffix(" 1")
+    raised = str(power).translate(_RAISED_CHARACTERS)
+    return factor / 10.0**power, f"10{raised} {name}".removesuffix(" 1")
 
 
 def write_labelled_quantity(value: float, unit: str, units: Conversion) -> str:

@@ -61,6 +61,13 @@ def test_a_wrong_point_is_refused_in_one_line(line, words):
         loads(dump(scene()) + f"\n[points]\n{line}\n")
 
 
+@mark.parametrize("name", ["V_max", "A_", "_", "p" * 40])
+def test_a_word_that_is_no_rate_names_a_point(name):
+    assert scene(Point(name, 3, (0.1, 0.2))).points[0].name == name
+    with refused("must be a word"):
+        Point("p" * 41, 3, (0.1, 0.2))
+
+
 def test_two_points_of_one_name_are_refused():
     with refused("a name of its own"):
         scene(POINTS[0], Point("P", 2, (0.1, 0.0)))
