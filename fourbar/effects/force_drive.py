@@ -145,7 +145,7 @@ def _list_bars(linkage: FourBar, point: Place) -> set[int]:
 class LinearDrive(Line, ForceDrive):
     """A force along the line between two points, as of a cylinder.
 
-    It is in N, positive where it pushes.
+    The force is in N, positive where it pushes.
 
     Parameters
     ----------

@@ -160,7 +160,7 @@ def release_at(scene: Scene, times: Array) -> Released:
 class _Reading(NamedTuple):
     """A motion as it is read in the angle of bar 2 or 4.
 
-    Its numbers y are theta_2, theta_4, both continuous over the turns, the speed of the
+    The numbers y are theta_2, theta_4, both continuous over the turns, the speed of the
     bar that is read, and the work done; one instant in Python's own numbers, or (4, n).
     """
 

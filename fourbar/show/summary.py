@@ -122,7 +122,7 @@ class Facts:
     def ends(self) -> tuple[float, float]:
         """First and last commanded angle or stroke.
 
-        It is a time for a motion law or a released motion.
+        A motion law and a released motion have times instead.
         """
         first, last = self.solution.at.places[[0, -1]].tolist()
         return first, last

@@ -104,7 +104,7 @@ def list_described(scene: Scene) -> list[tuple[str, NumberPath, Any]]:
 def _list_entries(key: str, path: NumberPath, described: Any) -> dict[str, SceneNumber]:
     """List the entries of the numbers that a description states.
 
-    Those of a pair are listed one by one, and those of each pin by its name.
+    The numbers of a pair are listed one by one, and what each pin has by its name.
     """
     entries = dict[str, SceneNumber]()
     if isinstance(described, PinRows):

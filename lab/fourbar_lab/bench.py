@@ -187,8 +187,8 @@ def _make_floor(theta_2: Array, out: dict[str, Array]) -> Callable[[], object]:
 def _prepare_thirteen(n: int) -> Callable[[], object]:
     """Return a call that sets up and solves the thirteen equations of n positions.
 
-    They are those of the free bodies' engine, which refines what LAPACK returns; how
-    the bars move is found beforehand.
+    The engine of the free bodies solves them, and refines what LAPACK returns; how the
+    bars move is found beforehand.
     """
     scene = make_example()
     at = command_positions(n)

@@ -62,7 +62,7 @@ validation/scenes/test_hard_families.py | bars
 validation/report/test_sections.py | hard_picture
 validation/engines/mujoco/test_simulate.py | monitor
 validation/check/test_check.py | calculated fitted
-validation/check/test_check.py | judge_table mistakes theirs wrong_scenes
+validation/check/test_check.py | judge_table theirs wrong_scenes
 validation/robots/test_check_mjcf.py | differences guard judge_loop
 validation/robots/test_check_mjcf.py | validation/engines/mujoco: describe
 validation/robots/test_check_mjcf.py | validation/engines/mujoco/robots: seen

@@ -35,7 +35,7 @@ from tests.support.scenes import (
     recommand,
     relink,
 )
-from tests.validation.check.test_causes import CAUSES
+from tests.validation.check.test_mistakes import CAUSES
 
 SCENES = {
     name: fourbar.load(MODELS / f"{name}.toml")

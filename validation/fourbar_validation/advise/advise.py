@@ -99,7 +99,7 @@ KINDS_OF_STEP: dict[str, dict[str, Any]] = {
 }
 """Changes of settings by the kind of step: solver, flywheel, integrator, pads.
 
-They are tried beside RK4 with tolerance 0, ten iterations and pads, which is "".
+Each is tried beside RK4 with tolerance 0, ten iterations and pads, which is "".
 """
 _MOST_TRIALS = 24
 """Most runs in which one search looks for the fewest steps that serve."""

@@ -49,7 +49,7 @@ class Judgement(Judge):
     def explanations(self) -> list[Explanation]:
         """Return the known mistakes that explain what differs.
 
-        They are those of all columns, of the quantities of a solution, or else of its
+        All columns are explained at once, or the quantities of a solution, or else its
         motion.
         """
         labels = {finding.quantity for finding in self.differing}

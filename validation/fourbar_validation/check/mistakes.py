@@ -102,7 +102,7 @@ def list_rates_of_rows(
 ) -> Iterator[Mistake]:
     """List the motion at the rates of the rows, as of a log, if more than these differ.
 
-    They are judged where the scene states its own.
+    The rates are judged where the scene states its own.
     """
     fields = dict(zip(("speed", "acceleration"), judge.at.names[1:], strict=True))
     table = replace(judge.stated, is_rounded=True)

@@ -313,7 +313,7 @@ def _command_each(base: Command, angle: Array) -> Command:
 def _move_to_own(own: Array, table: TheirTable) -> TheirTable:
     """Return the table at the scene's places that all rows round to, which are exact.
 
-    It is the same table if it may be chance.
+    Where that may be chance the table is returned as it is.
     """
     own = np.sort(own)
     if own[0] == own[-1]:

@@ -183,7 +183,7 @@ class TheirTable:
     def find_half(self, column: TheirColumn) -> Array:
         """Find half a unit of the last digit of each place or rate of a row.
 
-        It is 0 in a column without _DECIMALS: somebody chose its numbers.
+        A column without _DECIMALS has 0: somebody chose its numbers.
         """
         halves = column.rounding
         unit = 0.5 * column.unit.factor * (1.0 + EPS)

@@ -112,7 +112,8 @@ class Mistake(NamedTuple):
 def solve_other(text: str, scene: Scene, at: Command) -> Mistake:
     """Return the mistake of another problem than the one that was set.
 
-    It is solved when its numbers are asked for; without such a scene it has none.
+    The other problem is solved when its numbers are asked for; without such a scene
+    the mistake has none.
     """
 
     @cache

@@ -378,7 +378,7 @@ class Comparison:
     def _sizes(self) -> tuple[TermSizes, TermSizes | None]:
         """Return the sizes of the formulas' quantities, and of the answer's.
 
-        Those of the reference stand in where the answer has too few.
+        Sizes of the reference stand in where the answer has too few.
         """
         scene = self.scene
         answered = size_answer(scene, self._solution)

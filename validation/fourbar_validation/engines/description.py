@@ -166,7 +166,7 @@ def list_moving_parts(linkage: FourBar) -> list[MovingPart]:
 def place(point: Any, ground_angle: float) -> complex:
     """Return the vector to a spring's end from the first pin of its bar, m.
 
-    It is along and across the bar; on the ground it is in world axes.
+    On a moving bar it is along and across the bar, on the ground in world axes.
     """
     turned = ground_angle if point.bar == 1 else 0.0
     return cmath.rect(point.distance, point.angle) * cmath.rect(1.0, turned)

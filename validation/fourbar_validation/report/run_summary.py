@@ -415,7 +415,7 @@ class Summary:
     def shown(self) -> list[Record]:
         """Return the scenes shown, by name, at most SCENES_SHOWN.
 
-        They are those that fail, and those that used most of what is allowed.
+        Scenes that fail come with those that used most of what is allowed.
         """
         return sorted(self._shown, key=attrgetter("name"))
 

@@ -262,7 +262,7 @@ class _RobotReading:
     def _take_pins(self, root: ET.Element) -> list[ET.Element]:
         """Return the pins that close loops, which MuJoCo's own reader passes over.
 
-        They are the <loop_joint> of Isaac Sim, in whose form Drake's
+        Such a pin is the <loop_joint> of Isaac Sim, in whose form Drake's
         <drake:ball_constraint> is written.
         """
         for ball in root.findall("{*}ball_constraint"):

@@ -470,7 +470,7 @@ class _Finder:
     def _explain_count(self, chain: _Chain) -> str:
         """Say what another number of hinges makes, or a weld of few joints.
 
-        It is said too what makes it a four-bar.
+        What would make it a four-bar is said too.
         """
         freedoms = chain.pins - 3
         count = write_count(chain.pins, "joint" if chain.others else "hinge")

@@ -314,7 +314,7 @@ class LoopInside:
     def _follow(self, theta: Array) -> Array:
         """Return the pose at the last angles that `turn_bars` returns, (nq,).
 
-        Those at which the loop is open are passed over.
+        Angles at which the loop is open are passed over.
         """
         loop = self.loop
         closed = theta[np.isfinite(theta).all(axis=1)]
@@ -572,7 +572,7 @@ class LoopInside:
     def _read_forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         """Return the pin forces of an evaluated state, (4, 2), N.
 
-        Their order is that of PIN_FORCES.
+        Rows are in the order of PIN_FORCES.
         """
         loop = self.loop
         bearing = find_bearer_forces(model, data)

@@ -134,7 +134,7 @@ class RobotLoop:
     axes: Array
     """x, from which angles are counted, y, and the normal of the plane, (3, 3).
 
-    They are unit vectors in the frame of the ground's first body.
+    All three are unit vectors in the frame of the ground's first body.
     """
     misaligned: float
     """Largest angle between two axes, rad."""
@@ -323,8 +323,8 @@ def record_states(rows: Sequence[Any]) -> Any:
 def make_motion(angles: Iterable[float], rates: Iterable[float]) -> Array:
     """Return a motion at one speed, rad/s, and one acceleration, rad/s^2, (n, 3).
 
-    Its columns are angle, speed and acceleration of the commanded bar in the scene's
-    axes. `angles`: (n,), rad.
+    Columns are angle, speed and acceleration of the commanded bar in the scene's axes.
+    `angles`: (n,), rad.
     """
     return np.array([(angle, *rates) for angle in angles])
 

@@ -358,7 +358,7 @@ def examine_mended(
 ) -> list[LoopMeasurement | None]:
     """Measure a file with one entry at a time as in the generated one.
 
-    Those that hide others stay so. None stands for an entry that cannot be set, or if
+    Entries that hide others stay so. None stands for an entry that cannot be set, or if
     time is up.
     """
     found = find_loop_of_scene(file, scene, options)

@@ -257,8 +257,8 @@ class _RestPose:
     ) -> tuple[bool, ...]:
         """Tell by what a side is that of the scene; what comes first decides.
 
-        It is the stated or the drawn theta_2, then the scene's output, and last the
-        leader's range that meets the scene's. `angles`: theta_1 to theta_4 in the file,
+        First comes the stated or the drawn theta_2, then the scene's output, and last
+        the leader's range that meets the scene's. `angles`: theta_1 to theta_4 in the file,
         seen from the tip, rad, NaN if it does not tell them.
         """
         scene = self.scene

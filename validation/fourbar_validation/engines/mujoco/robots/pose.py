@@ -229,7 +229,8 @@ def _list_unknown_masses(
 ) -> tuple[int, ...]:
     """List the bodies that move and whose mass or inertia missing meshes would give.
 
-    They have others where what stands in for a mesh has another size.
+    Mass and inertia differ from those of the robot where what stands in for a mesh has
+    another size.
     """
     if not file.missing:
         return ()

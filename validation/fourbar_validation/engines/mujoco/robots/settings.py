@@ -214,7 +214,7 @@ class SettingsSearch:
     ) -> TriedSettings:
         """Measure what settings reach.
 
-        They are not simulated where their single states are not within an error.
+        A setting whose single states are not within the error is not simulated.
         """
         known = self.tried.get(frozenset(changes.items()))
         if known is not None and (
