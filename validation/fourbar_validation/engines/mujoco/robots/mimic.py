@@ -258,8 +258,8 @@ class _RestPose:
         """Tell by what a side is that of the scene; what comes first decides.
 
         First comes the stated or the drawn theta_2, then the scene's output, and last
-        the leader's range that meets the scene's. `angles`: theta_1 to theta_4 in the file,
-        seen from the tip, rad, NaN if it does not tell them.
+        the leader's range that meets the scene's. `angles`: theta_1 to theta_4 in the
+        file, seen from the tip, rad, NaN if it does not tell them.
         """
         scene = self.scene
         shown = stated
