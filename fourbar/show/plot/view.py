@@ -128,7 +128,7 @@ class View:
         return f"{theta}, t = {place:.4g} s".replace("-", "−")
 
     @property
-    def plane(self) -> "DrawingPlane":
+    def plane(self) -> DrawingPlane:
         """Coordinates that hold all positions of the sweep."""
         return DrawingPlane(self.scene, self.sweep, self.units)
 
