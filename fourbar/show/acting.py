@@ -10,7 +10,7 @@ from fourbar.effects import Spring, Springs, Torsion
 from fourbar.evaluation.case import compute_shown_state
 from fourbar.formulas.mobility import TURN
 from fourbar.linkage import FIRST_PIN, PINS
-from fourbar.quantities import CHANGE_POINT, WOUND, Array, Mask
+from fourbar.quantities import CHANGE_POINT, WOUND, Array, Indices, Mask
 from fourbar.scene import Command, Scene, command
 from fourbar.scene.motion import FEWEST_POINTS, Law, Sweep
 from fourbar.show.driving import name_places
@@ -18,7 +18,13 @@ from fourbar.show.motion_curves import goes_on_between
 from fourbar.show.shown_units import POSITION_DIGITS, drop_rounding, write_short
 from fourbar.solution import Conversion, Solution
 from fourbar.solving import solve
-from fourbar.studies.course import MotionCourse, Stretch, list_stretches
+from fourbar.studies.course import (
+    Condition,
+    MotionCourse,
+    Stretch,
+    bisect,
+    list_stretches,
+)
 from fourbar.studies.passing import SAME_POSITION
 
 _INSTANTS_OF_AN_END = 33
@@ -148,9 +154,10 @@ def list_spring_notes(solution: Solution, units: Conversion) -> list[str]:
             throughout = beyond[motion.assembled].all()
             if not beyond.any() or (throughout and not words):
                 continue
+            locate = partial(_locate_change, motion, is_beyond)
+            stretches = list_stretches(beyond, motion.at.places, locate)
             where = " and ".join(
-                write_stretch(motion, stretch, units)
-                for stretch in list_stretches(beyond, motion.at.places)
+                write_stretch(motion, stretch, units) for stretch in stretches
             )
             said = (
                 f", a gas spring, is {words} length of"
@@ -255,6 +262,32 @@ def _mark_beyond(spring: Spring, sense: float, end: float, solution: Solution) -
     """Mark the positions at which a spring is longer, or shorter, than a length."""
     distance = measure_end_distance(solution.scene, spring, solution.at)
     return solution.assembled & (sense * distance > sense * end)
+
+
+def _locate_change(
+    solution: Solution, holds: Condition, rows: Indices, ends: Array
+) -> Array:
+    """Return where a condition changes after some rows, (n,), from `ends`.
+
+    Between listed positions, strokes and times, and where the linkage does not close,
+    nothing is sought: the change is at the position at which the condition holds.
+    """
+    at = solution.at
+    passes = solution.assembled[rows] & solution.assembled[rows + 1]
+    is_listed = isinstance(solution.scene.motion.angle, np.ndarray)
+    if not passes.any() or is_listed or at.moves_stroke or at.time is not None:
+        return ends
+    before = at.part(rows[passes])._replace(origin=None)
+
+    def mark(places: Array) -> Mask:
+        between = before._replace(angle=places)
+        return holds(solve(solution.scene, "position", at=between))
+
+    low, high = (at.places[rows[passes] + after] for after in (0, 1))
+    held = mark(low)
+    low, high = bisect(lambda places: mark(places) == held, low, high)
+    ends[passes] = 0.5 * (low + high)
+    return ends
 
 
 def write_stretch(solution: Solution, stretch: Stretch, units: Conversion) -> str:
