@@ -169,7 +169,7 @@ def bearing_load(solution: Solution, pin: str) -> BearingLoad:
     and None where they grow without bound. Those of a list or of a released motion are
     of the positions that have a value.
     """
-    if pin not in [*PIN_FORCE]:
+    if not isinstance(pin, str) or pin not in PIN_FORCE:
         raise InputError("pin", pin, "must be one of " + ", ".join(PIN_FORCE))
     name = PIN_FORCE[pin]
     motion = _describe_loads(solution)

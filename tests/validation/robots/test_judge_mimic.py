@@ -103,7 +103,7 @@ def test_theta_2_is_counted_from_where_the_file_has_the_bar(
     assert f"theta_2 is 90 deg {sign} drive, from 60 to 120 deg" in printed
     # typed into the file, a polynomial turns the rocker as the loop does
     best = report.fits[MINIMAX][3]
-    polycoef = " ".join(repr(number) for number in best.polynomial.coef)
+    polycoef = " ".join(repr(number) for number in best.polynomial.coef.tolist())
     again = measure_mimic(
         write_upright(tmp_path, polycoef, sense, pad), "rocker_j", GRIPPER
     )
@@ -198,7 +198,7 @@ def test_each_error_stands_with_its_name(tmp_path, capsys):
 @pytest.mark.slow
 def test_an_axis_the_other_way_takes_the_opposite_polynomial(tmp_path):
     best = measure_mimic(write(tmp_path), "s", KNEE).fits[MINIMAX][2]
-    opposite = " ".join(f"{-number!r}" for number in best.polynomial.coef)
+    opposite = " ".join(f"{-number!r}" for number in best.polynomial.coef.tolist())
     turned = measure_mimic(write(tmp_path, opposite, axis=-1), "s", KNEE)
     assert angle_of(turned) == approx(best.angle, rel=1e-9)
 

@@ -568,7 +568,7 @@ OTHER_SCENES = {
         with_springs(DRAWN),
         with_springs(replace(DRAWN, length=0.13)),
     ),
-    "gravity is taken along -y": (
+    "gravity points to -90 deg": (
         with_effects(Gravity(angle=-1.2)),
         with_effects(Gravity()),
     ),

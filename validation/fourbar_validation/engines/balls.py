@@ -28,11 +28,11 @@ from fourbar_validation.compare.tolerance import EPS, RANDOM_WALK
 from fourbar_validation.engines.description import (
     FORCE_BETWEEN,
     SHARED_BY_EXACT_ENGINES,
+    Sizes,
     find_stated_lengths,
     find_unknown,
 )
 from fourbar_validation.engines.loop import read_each
-from fourbar_validation.engines.prediction import Sizes
 
 Ball: TypeAlias = Any
 ComplexBall: TypeAlias = Any

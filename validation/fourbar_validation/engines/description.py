@@ -53,6 +53,8 @@ _TELLS = 2.0**-53
 SHARED_BY_EXACT_ENGINES = "the description, what is commanded and the branch"
 """Words of a report for what an exact engine takes from the formulas' side."""
 
+Sizes = dict[str, float]
+"""Sizes of inputs or outputs, by their names."""
 Value = float | str | tuple[float, ...]
 """Value of an entry of a model file, in SI and rad."""
 

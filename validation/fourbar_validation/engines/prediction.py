@@ -38,10 +38,8 @@ from fourbar_validation.compare.tolerance import (
     mark_touching,
     sum_lengths,
 )
-from fourbar_validation.engines.description import list_speeds
+from fourbar_validation.engines.description import Sizes, list_speeds
 
-Sizes = dict[str, float]
-"""Sizes of inputs or outputs, by their names."""
 DRIVE_QUANTITIES = (COUPLE.value, LINE.value)
 """Quantities of a drive, of which a scene has one."""
 LARGEST_FIRST_ORDER = 0.1
