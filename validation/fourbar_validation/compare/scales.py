@@ -137,15 +137,16 @@ class TermSizes:
         """Sum the terms of a speed or an acceleration of a bar."""
         solution = self.solution
         _, a, b, c = self.scene.linkage.lengths
-        rate, _, bar = quantity.partition("_")
-        terms: Array = np.abs(getattr(solution, f"{rate}_2"))
-        if bar == "2":
+        accelerates = UNITS[quantity] == "rad/s^2"
+        terms: Array = np.abs(solution.alpha_2 if accelerates else solution.omega_2)
+        if quantity.endswith("_2"):
             return terms
         terms = a * terms
-        if rate == "alpha":
+        if accelerates:
             w2, w3, w4 = (getattr(solution, f"omega_{k}") for k in MOVING_BARS)
             terms = a * w2 * w2 + terms + b * w3 * w3 + c * w4 * w4
-        return terms / ((b if bar == "3" else c) * solution.condition)
+        turning = b if quantity.endswith("_3") else c
+        return terms / (turning * solution.condition)
 
     def _sum_motion(self, quantity: str) -> Array:
         """Sum the terms of a point's velocity or acceleration, bar by bar."""
