@@ -3,6 +3,7 @@
 Newton-Euler equations and a loop closed by a quadratic share nothing with the formulas.
 """
 
+import json
 from dataclasses import replace
 from itertools import combinations, cycle, product
 from math import pi, tau
@@ -78,12 +79,12 @@ rocker | 0.5 0.4 0.3 0.25 0.2
 """Lengths, and the ground's angle where it is not 0."""
 LINKAGES = {name: bare(*map(float, stated.split())) for name, stated in LENGTHS}
 LINKAGES |= {f"drawn {n}": draw_linkage(np.random.default_rng(n)) for n in range(4)}
-BODIES = [
-    ((0.2, 1e-3, (0.03, 0.4)), (0.5, None, (0.1, -0.2)), (0.4, 2e-3, (0.12, 0.3))),
-    ((0.2, None, None), (0.5, 0.004, (0.13, 0.3)), (0.4, None, None)),
-    ((0.0, 1.0, (0.1, 1.0)), (0.0, 0.0, None), (0.4, 1.0, (0.0, 0.0))),
-    ((0.0, 0.0, None), (0.5, 0.0, (0.1, 2.0)), (0.0, 0.7, None)),
-]
+BODIES = read_rows("""
+[0.2, 1e-3, [0.03, 0.4]] | [0.5, null, [0.1, -0.2]] | [0.4, 2e-3, [0.12, 0.3]]
+[0.2] | [0.5, 0.004, [0.13, 0.3]] | [0.4]
+[0.0, 1.0, [0.1, 1.0]] | [0.0, 0.0] | [0.4, 1.0, [0.0, 0.0]]
+[0.0, 0.0] | [0.5, 0.0, [0.1, 2.0]] | [0.0, 0.7]
+""")
 """Mass, inertia and centre of bars 2, 3 and 4."""
 ON_3 = Place(3, (0.08, 0.2))
 FACTORS = Table((0.0, 2.0, 5.0, tau), (1.0, 3.0, -1.0, 1.0))
@@ -130,7 +131,7 @@ PUSHES = [
 def embody(linkage, bodies):
     """Give the moving bars these masses, inertias and centres."""
     moving = zip(linkage.moving, bodies, strict=True)
-    bars = (Bar(bar.length, *body) for bar, body in moving)
+    bars = (Bar(bar.length, *json.loads(body)) for bar, body in moving)
     return FourBar(linkage.ground, *bars, linkage.ground_angle)
 
 
