@@ -351,7 +351,7 @@ class Effect(Placed):
 
         The code is a second derivation and uses nothing of `act`.
 
-        `bars`: of `engines.tree.Loaded`, with `push`, `couple`, `angle`, `velocity`,
+        `bars`: of `engines.loaded.Loaded`, with `push`, `couple`, `angle`, `velocity`,
         `alpha`, `rotate`, `first_pin`, `locate`, `end`, `pin_loads`.
         """
         raise NotImplementedError

@@ -33,13 +33,13 @@ from fourbar_validation.check.problem import (
 from fourbar_validation.compare.answer import EngineError
 from fourbar_validation.compare.rows import say_error, write_csv_rows, write_one_line
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.guests import (
+from fourbar_validation.engines.environments import (
     ENGINES_FILE,
-    HELLO,
     EngineEntry,
     prepare_program,
     read_engines_of,
 )
+from fourbar_validation.engines.guests import HELLO
 from fourbar_validation.engines.programs import Running
 from fourbar_validation.places import find_checkout
 from fourbar_validation.report.machine import name_machine

@@ -12,7 +12,7 @@ from pytest import fixture, importorskip, mark
 from fourbar_lab.benchmark import BENCHMARKED_ENGINES, REFUSED, read_reasons
 from fourbar_lab.cli import status
 from fourbar_validation.compare.rows import read_cell_text
-from fourbar_validation.engines.guests import read_engines, read_engines_of
+from fourbar_validation.engines.environments import read_engines, read_engines_of
 from tests.support.guests import PLAIN
 
 WRONG = ('"torque": moments[0]', '"torque": 1.1 * moments[0]')

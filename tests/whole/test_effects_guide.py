@@ -15,7 +15,7 @@ from fourbar import effects, errors, mjcf
 from fourbar.files import dump, loads
 from fourbar_validation.compare import effect_sizes as in_scales
 from fourbar_validation.engines import free_body
-from fourbar_validation.engines import tree as on_trees
+from fourbar_validation.engines import loaded as on_bars
 from fourbar_validation.engines.registry import ENGINES, HARD_ENGINES
 from fourbar_validation.run.judge import judge
 from tests.support.checkout import ROOT, read, run_python
@@ -128,7 +128,7 @@ def test_every_effect_of_the_package_has_a_row_in_each_table():
     """Loads have a table of their own in a file."""
     keys = {*effects.list_kinds()}
     assert keys == {*free_body.WRENCH_OF}
-    assert keys | {"load"} == {*on_trees.TERM_OF} == {*in_scales.SIZE_OF}
+    assert keys | {"load"} == {*on_bars.TERM_OF} == {*in_scales.SIZE_OF}
     for kind in (*effects.list_kinds().values(), effects.Load):
         assert kind.size is effects.Effect.size  # nothing judged sets its own scale
     without_mjcf = {

@@ -23,7 +23,7 @@ from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import LONGEST_CELL, read_columns
 from fourbar_validation.compare.rows import COLUMN_TYPES, FAILS, RESULT_COLUMNS
 from fourbar_validation.compare.tolerance import EQUIVALENCE
-from fourbar_validation.engines import guests, programs, registry
+from fourbar_validation.engines import environments, programs, registry
 from fourbar_validation.regression.record import MOST_ROWS_COMPARED, About, write_about
 from fourbar_validation.report.terminal import print_table
 from fourbar_validation.run.run import Plan, run
@@ -52,7 +52,7 @@ STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 """Control characters, but for the ends of lines."""
 ACTIVE = re.compile('<script>alert|<img src=x|" onmouseover="')
 """What a browser would run."""
-EXACT = guests.choose_engines("free-body")
+EXACT = environments.choose_engines("free-body")
 FORMS = ("markdown", "html", "junit")
 
 

@@ -24,7 +24,7 @@ from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FAILS, REFUSES, Row
 from fourbar_validation.compare.tolerance import EQUIVALENCE
 from fourbar_validation.engines import workers
-from fourbar_validation.engines.guests import choose_engines
+from fourbar_validation.engines.environments import choose_engines
 from fourbar_validation.engines.registry import Engine
 from fourbar_validation.report.machine import hash_modules
 from fourbar_validation.report.scene_record import Record

@@ -11,7 +11,7 @@ from fourbar.quantities import LINE_QUANTITIES, QUANTITIES
 from fourbar_validation.cli import status
 from fourbar_validation.compare.results_file import read_columns
 from fourbar_validation.compare.rows import FORMULAS, RESULT_COLUMNS, Row
-from fourbar_validation.engines.guests import choose_engines
+from fourbar_validation.engines.environments import choose_engines
 from fourbar_validation.engines.mujoco.shipped import QUANTITY as SHIPPED
 from fourbar_validation.engines.registry import (
     ENGINES,

@@ -30,8 +30,9 @@ from fourbar_validation.engines.description import (
     inertia_about_first_pin,
     list_moving_parts,
 )
+from fourbar_validation.engines.loaded import has_term, list_wrenches
 from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import Tree, has_term, list_wrenches
+from fourbar_validation.engines.tree import Tree
 
 _BY_SPEEDS = JacobianWrtVariable.kV
 UP = (0.0, 0.0, 1.0)

@@ -26,9 +26,9 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
     reduce_angle,
 )
+from fourbar_validation.engines.loaded import BarValues, Loaded, has_term, list_wrenches
 from fourbar_validation.engines.loop import Exact
 from fourbar_validation.engines.sliding import solve_refined
-from fourbar_validation.engines.tree import BarValues, Loaded, has_term, list_wrenches
 
 ZERO_VECTOR = (0.0, 0.0, 0.0)
 """Zero vector."""

@@ -14,7 +14,7 @@ import click
 
 from fourbar.errors import DependencyError, InputError
 from fourbar.linkage import record
-from fourbar_validation.engines.guests import make_environment, read_engines
+from fourbar_validation.engines.environments import make_environment, read_engines
 from fourbar_validation.engines.programs import run_to_end
 from fourbar_validation.places import CHECKOUT
 

@@ -25,7 +25,7 @@ from fourbar_lab.simulators import (
 from fourbar_lab.simulators.problems import PROBLEMS
 from fourbar_validation.check.problem import judge_answers, read_problem
 from fourbar_validation.engines import protocol
-from fourbar_validation.engines.guests import read_engines_of
+from fourbar_validation.engines.environments import read_engines_of
 from tests.support.checkout import ROOT
 from tests.support.scenes import low_parallelogram, recommand
 

@@ -3,7 +3,7 @@
 import pytest
 
 from fourbar_validation.engines import registry
-from fourbar_validation.engines.guests import fill_table
+from fourbar_validation.engines.environments import fill_table
 
 NAMES = ["exudyn-constraints", "opensim-constraints", "drake-inverse"]
 

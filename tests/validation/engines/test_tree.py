@@ -25,7 +25,7 @@ from fourbar.effects import (
     list_kinds,
 )
 from fourbar_validation.engines import free_body
-from fourbar_validation.engines.tree import TERM_OF
+from fourbar_validation.engines.loaded import TERM_OF
 from fourbar_validation.run.judge import judge
 from tests.support.here import EXACT, THROUGH_TIME
 from tests.support.rows import read_rows, slow_but

@@ -10,7 +10,7 @@ import pytest
 
 import fourbar
 from fourbar_validation.engines.guests import list_needs
-from fourbar_validation.engines.tree import TERM_OF
+from fourbar_validation.engines.loaded import TERM_OF
 from fourbar_validation.run.judge import judge
 from fourbar_validation.run.question import FREE_BODY
 from fourbar_validation.scenes.suites import read_default_suite

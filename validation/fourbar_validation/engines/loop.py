@@ -38,15 +38,8 @@ from fourbar_validation.engines.free_body_closure import (
     NEWTON_STEPS,
     find_angle,
 )
-from fourbar_validation.engines.tree import (
-    Assembled,
-    BarValues,
-    Components,
-    Loaded,
-    Tree,
-    solve_closed,
-    solve_multipliers,
-)
+from fourbar_validation.engines.loaded import Assembled, BarValues, Components, Loaded
+from fourbar_validation.engines.tree import Tree, solve_closed, solve_multipliers
 
 NOT_ANSWERED = frozenset(
     (

@@ -22,15 +22,14 @@ from fourbar_validation.engines.description import (
     find_unknown,
     list_moving_parts,
 )
-from fourbar_validation.engines.loop import Assembler, Exact
-from fourbar_validation.engines.tree import (
+from fourbar_validation.engines.loaded import (
     Components,
-    Tree,
     Wrenches,
     has_term,
     list_wrenches,
-    solve_closed,
 )
+from fourbar_validation.engines.loop import Assembler, Exact
+from fourbar_validation.engines.tree import Tree, solve_closed
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

@@ -14,7 +14,8 @@ import click
 from fourbar.errors import HOLDS, DependencyError, InputError, write_count
 from fourbar.writing import require_file, write_text
 from fourbar_validation.compare.results_file import read_columns
-from fourbar_validation.engines.guests import adjust_engines, choose_engines, fill_table
+from fourbar_validation.engines.environments import choose_engines, fill_table
+from fourbar_validation.engines.guests import adjust_engines
 from fourbar_validation.engines.registry import Engine, hold_fully
 from fourbar_validation.regression.accept import (
     FORMS,

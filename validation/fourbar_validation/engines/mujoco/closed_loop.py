@@ -16,7 +16,8 @@ import numpy as np
 from fourbar.linkage import BAR_NAMES, MOVING_BARS
 from fourbar.mjcf.model import CYLINDER
 from fourbar.quantities import Array
-from fourbar_validation.engines.tree import BEARERS, Assembled, Components, solve_closed
+from fourbar_validation.engines.loaded import Assembled, Components
+from fourbar_validation.engines.tree import BEARERS, solve_closed
 
 # MuJoCo would write warnings to standard error and to a file of a fixed name in the
 # working folder; the monitor reads them from its data

@@ -21,14 +21,14 @@ from fourbar_validation.engines.description import (
     list_moving_parts,
 )
 from fourbar_validation.engines.limits import LIGHTEST
-from fourbar_validation.engines.loop import Exact
-from fourbar_validation.engines.tree import (
+from fourbar_validation.engines.loaded import (
     Components,
-    Tree,
     Wrenches,
     has_term,
     list_wrenches,
 )
+from fourbar_validation.engines.loop import Exact
+from fourbar_validation.engines.tree import Tree
 
 
 def find_limit_met(parts: Iterable[MovingPart]) -> str:

@@ -29,6 +29,7 @@ from fourbar_validation.engines.limits import (
     find_exceeded,
     find_uneven,
 )
+from fourbar_validation.engines.loaded import BarValues
 from fourbar_validation.engines.loop import MADE, Assembler, make_blank
 from fourbar_validation.engines.mujoco.closed_loop import (
     O2,
@@ -56,7 +57,6 @@ from fourbar_validation.engines.mujoco.runner import (
     supply_forces,
     take_full_size,
 )
-from fourbar_validation.engines.tree import BarValues
 
 SHARED_WITH_SIMULATION = (
     "lengths, masses, inertias, centres, loads and effects as MJCF text; tables of"

@@ -14,8 +14,8 @@ from pytest import MonkeyPatch, fixture, mark, raises
 import fourbar
 from fourbar.errors import LONGEST_MESSAGE, DependencyError, InputError
 from fourbar_validation.compare.rows import AGREES
-from fourbar_validation.engines import guests as environments
-from fourbar_validation.engines.guests import (
+from fourbar_validation.engines import environments
+from fourbar_validation.engines.environments import (
     EngineEntry,
     choose_engines,
     fill_table,
