@@ -50,7 +50,7 @@ validation/run/test_judge.py | validation/compare: answer bodies effect_sizes
 validation/run/test_judge.py | identities judge_engines law question
 # adapters: judged against printed figures, each other, and faults put in front of
 # them
-validation/engines/test_engines.py | description limits pinocchio
+validation/engines/test_engines.py | description limits loaded pinocchio
 validation/engines/test_engines.py | lab/engines: drake exudyn exudyn_elements opensim
 validation/engines/test_engines.py | validation/scenes: random
 validation/engines/test_engines.py | validation/engines/mujoco: inverse
