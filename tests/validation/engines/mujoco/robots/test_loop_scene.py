@@ -83,6 +83,30 @@ def find_width(made):
     return sweep.stop - sweep.start
 
 
+@pytest.mark.parametrize("pin, end", [("A", 0.2), ("O4", 0.15)])
+def test_the_range_ends_where_another_hinge_meets_its_stop(pin, end):
+    """The hinge's angle at the end of the range, by two circles, is the stop."""
+    planar = Planar()
+    hinge = f'name="{pin}" axis="0 0 1" '
+    stop = f'{hinge}limited="true" range="-2 {end}" '
+    made = read_scene(planar.text().replace(hinge, stop)).scene
+    _, a, b, c = planar.lengths()
+    crank, end_of_rocker, ground = (
+        complex(*planar.pins[name]) for name in ("A", "B", "O4")
+    )
+    reached = []
+    for theta_2 in (made.motion.angle.start, made.motion.angle.stop):
+        turned = theta_2 - made.linkage.ground_angle + cmath.phase(ground)
+        tip = cmath.rect(a, turned)
+        there = meet_circles(tip, ground, b, c)
+        turns = {
+            "A": (there - tip) / (end_of_rocker - crank) * crank / tip,
+            "O4": (there - ground) / (end_of_rocker - ground),
+        }
+        reached.append(cmath.phase(turns[pin]))
+    assert min(abs(one - end) for one in reached) < 1e-9
+
+
 def test_without_a_range_it_goes_as_far_as_the_loop_assembles():
     planar = Planar()
     d, a, b, c = planar.lengths()

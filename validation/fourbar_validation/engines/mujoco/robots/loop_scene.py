@@ -485,6 +485,8 @@ class SceneOfLoop(SeenLoop):
         the range allows. Return theta_2 at the ends, and theta_1 to theta_4 at the
         first of them, rad.
         """
+        from scipy.optimize import brentq
+
         theta_2 = self.loop.angles[1]
         linkage = self.inside.linkage
         closing = np.array([-math.inf, math.inf])
@@ -514,13 +516,8 @@ class SceneOfLoop(SeenLoop):
             )
         turns = np.round((theta[in_pose] - self.loop.angles) / math.tau)
         theta -= math.tau * turns
-        free = (angles >= low) & (angles <= high)
-        for pin in self.hinge:
-            first, second = PINS[pin]
-            beta = theta[:, second - 1] - theta[:, first - 1]
-            least, most = self.stops(pin) or (-math.inf, math.inf)
-            free &= beta >= least - OUTSIDE_A_RANGE
-            free &= beta <= most + OUTSIDE_A_RANGE
+        slack = self._measure_slack(theta)
+        free = (angles >= low) & (angles <= high) & (slack >= -OUTSIDE_A_RANGE)
         if not free.any():
             raise InputError(
                 "MJCF",
@@ -530,11 +527,38 @@ class SceneOfLoop(SeenLoop):
         places = np.flatnonzero(free)
         runs = split_runs(places)
         run = min(runs, key=lambda run: np.abs(run - in_pose).min())
-        low, high = angles[run[[0, -1]]].tolist()
+
+        def find_end(inner: int, outer: int) -> float:
+            """Return where a hinge meets its stop on the way to an angle, rad."""
+            if not 0 <= outer < len(angles) or not slack[inner] > 0.0 > slack[outer]:
+                return float(angles[inner])
+
+            def measure(angle: float) -> float:
+                path = self.inside.turn_bars(np.array([angles[inner], angle]))
+                turns = np.round((path[0] - theta[inner]) / math.tau)
+                return float(self._measure_slack(path - math.tau * turns)[1])
+
+            return float(brentq(measure, angles[inner], angles[outer]))
+
+        low = find_end(run[0], run[0] - 1)
+        high = find_end(run[-1], run[-1] + 1)
         start = max(low, min(near, high - math.tau))
         stop = min(high, start + math.tau)
         at_start = [float(np.interp(start, angles, column)) for column in theta.T]
         return start, stop, at_start
+
+    def _measure_slack(self, theta: Array) -> Array:
+        """Return how far the nearest stop of a hinge is, negative beyond it, rad, (n,).
+
+        `theta`: theta_1 to theta_4, (n, 4), rad.
+        """
+        slack = np.full(len(theta), math.inf)
+        for pin in self.hinge:
+            first, second = PINS[pin]
+            beta = theta[:, second - 1] - theta[:, first - 1]
+            least, most = self.stops(pin) or (-math.inf, math.inf)
+            slack = np.minimum(slack, np.minimum(beta - least, most - beta))
+        return slack
 
     def _remark_assembly(self, branch: int) -> None:
         """Say where the pose does not tell the assembly."""
